@@ -23,7 +23,7 @@ from hiproof.evaluate.models import BuildingModel, read_models
 from hiproof.model import Solid
 from hiproof.simulate import demo_files
 from hiproof.write.colours import WALL_COLOUR, srgb, type_colour
-from hiproof.write.meshes.page_mesh import solid_mesh
+from hiproof.write.meshes.triangles import solid_mesh
 
 SIZE, FINER = np.array([840, 500]), 2  # pixels of the picture; drawn so many times finer
 FRAMES, RISING, STILL = 40, 6, (900, 2600)  # of the film and of a house; ms of its first and last

@@ -5,8 +5,7 @@ import pytest
 import shapely
 
 from hiproof.compose import check_solid, compose, terrain_intersection
-from hiproof.compose.profile import FOOT_TOLERANCE_M
-from hiproof.compose.underside import make_underside
+from hiproof.compose.underside import FOOT_TOLERANCE_M, make_underside
 from hiproof.errors import CompositionError
 from hiproof.frames import LocalFrame
 from hiproof.model import (

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from hiproof.cli.app import app
 from hiproof.enrich.run import enrich_run
-from hiproof.enrich.sky import make_sky
+from hiproof.enrich.sun import make_sky
 from hiproof.enrich.weather import read_year
 from hiproof.errors import InputError
 from hiproof.settings import EnrichSettings

@@ -13,7 +13,7 @@ from hiproof.cli.app import app
 from hiproof.edit.points import RunPoints
 from hiproof.evaluate.run import evaluate_run
 from hiproof.parametric.run import build_file
-from hiproof.update.named import choose_clouds
+from hiproof.update.dates import choose_clouds
 from hiproof.update.request import UpdateRequest
 from hiproof.update.run import update_area
 from run_records import by_id, records

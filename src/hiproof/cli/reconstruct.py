@@ -70,7 +70,7 @@ def reconstruct(
 
     def make_request() -> Any:
         from ..city.request import Request
-        from ..update.named import choose_clouds
+        from ..update.dates import choose_clouds
 
         found, epochs = choose_clouds(clouds or (), epoch or ())
         settings = read_settings()

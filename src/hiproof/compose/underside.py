@@ -11,7 +11,9 @@ whole tenths of a millimetre throughout.
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -19,12 +21,12 @@ import shapely
 
 from ..errors import CompositionError
 from ..geometry.rings import with_area
-from ..model import CEILING, GROUND, ROOF, WALL, Face, Passage, Solid, Underside
+from ..model import CEILING, GROUND, ROOF, WALL, Face, Model, Passage, Solid, Underside
 from ..settings import ComposeSettings
 from .arrangement import GRID_M
 from .building_parts import list_edges
 from .check import check_solid
-from .profile import Profile
+from .settle import PLAN_DIGITS
 
 LEAST_ROOM_M = 0.5  # between the ground and a passage's ceiling; nobody goes through less
 SNAP_UNITS = 1000.0  # 0.1 m; corners of passages so near a wall lie on it
@@ -403,3 +405,96 @@ def number_faces(faces: Iterable[tuple[list[list[Corner]], str, int]]) -> Solid:
         for rings, kind, part in faces
     )
     return Solid(np.round(np.array(list(numbers), float) * GRID_M, 4), numbered)
+
+
+SPACING_M = 1.0  # between samples along a wall; the lines have a vertex at least as often
+# m; a wall's foot follows the terrain so closely. Ground points are no more accurate.
+FOOT_TOLERANCE_M = 0.05
+
+
+class Profile:
+    """The heights along closed `lines` (m, 3)."""
+
+    def __init__(self, lines: tuple[np.ndarray, ...]) -> None:
+        self.lines = lines
+        self.plans = np.array([shapely.linestrings(line[:, :2]) for line in lines])
+        self.lengths = [
+            np.append(0.0, np.hypot(*np.diff(line[:, :2], axis=0).T).cumsum()) for line in lines
+        ]
+
+    def height_at(self, xy: np.ndarray) -> np.ndarray:
+        """Return the height (n,) of the nearest place on the lines at `xy` (n, 2)."""
+        points = shapely.points(xy)
+        nearest = shapely.distance(points[:, None], self.plans[None]).argmin(axis=1)
+        along = shapely.line_locate_point(self.plans[nearest], points)
+        return np.array(
+            [
+                np.interp(at, self.lengths[k], self.lines[k][:, 2])
+                for k, at in zip(nearest, along, strict=True)
+            ]
+        )
+
+    def place_knots(self, start: np.ndarray, end: np.ndarray) -> np.ndarray:
+        """Return places (k, 2) between two ends of a wall where its foot bends.
+
+        They are the same from either end.
+        """
+        if tuple(end) < tuple(start):
+            start, end = end, start
+        count = math.ceil(math.dist(start, end) / SPACING_M)
+        share = np.linspace(0.0, 1.0, count + 1)
+        xy = start + share[:, None] * (end - start)
+        bends = find_bends(share, self.height_at(xy), FOOT_TOLERANCE_M)
+        return xy[bends]
+
+
+def find_bends(t: np.ndarray, z: np.ndarray, tolerance: float) -> list[int]:
+    """Return the samples at which a profile bends (Douglas and Peucker).
+
+    Profiles of heights `z` (n,) at `t` (n,) stay within `tolerance` of the line through their ends
+    and bends.
+
+    >>> find_bends(np.arange(4.0), np.array([0.0, 0.0, 0.0, 3.0]), 0.05)
+    [2]
+    """
+    off = np.abs(z - np.interp(t, t[[0, -1]], z[[0, -1]]))
+    worst = int(off.argmax())
+    if off[worst] <= tolerance:
+        return []
+    before = find_bends(t[: worst + 1], z[: worst + 1], tolerance)
+    after = find_bends(t[worst:], z[worst:], tolerance)
+    return [*before, worst, *(worst + bend for bend in after)]
+
+
+def add_underside(model: Model, underside: Underside) -> Model:
+    """Return the model with its `underside` made.
+
+    Raises CompositionError as `make_underside` does.
+    """
+    level = model.on_one_level
+    if underside.is_level:
+        return replace(model, solid=level, underside=underside, level_solid=None)
+    solid = finish_solid(level, underside, model.roof.frame.origin, model.compose)
+    return replace(model, solid=solid, underside=underside, level_solid=level)
+
+
+def add_passage(model: Model, outline: shapely.Polygon, z_ceiling: float) -> Model:
+    """Return the model with one more passage.
+
+    Its `outline` is in the roof's frame, the height of its ceiling in the world. Raises
+    CompositionError as `make_underside` does.
+    """
+    passage = Passage(outline, z_ceiling - float(model.roof.frame.origin[2]))
+    passages = (*model.underside.passages, passage)
+    return add_underside(model, replace(model.underside, passages=passages))
+
+
+def finish_solid(
+    level: Solid, underside: Underside, origin: np.ndarray, compose: ComposeSettings | None = None
+) -> Solid:
+    """Return a solid over one level (in the world) with its underside made.
+
+    The roof's frame begins at `origin` (3,).
+    """
+    local = Solid(np.round(level.vertices - origin, PLAN_DIGITS), level.faces)
+    return make_underside(local, underside, compose or ComposeSettings()).move(origin)

@@ -16,7 +16,7 @@ import numpy as np
 from ..model import Building
 from ..parametric.building import build
 from ..primitives.catalogue import CATALOGUE
-from ..primitives.onion import NECK
+from ..primitives.revolved import NECK
 from .view import (
     SeenFace,
     bound_sphere,

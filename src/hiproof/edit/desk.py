@@ -26,7 +26,7 @@ from ..parametric.record import list_at, number, text_at
 from ..primitives.catalogue import CATALOGUE
 from ..read.damage import finite
 from ..status import Attention
-from ..write.meshes.page_mesh import pack_values
+from ..write.meshes.triangles import pack_values
 from ..write.parameters import building_record
 from ..write.values import plain_text
 from .actions import apply_edit

@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import HiproofError
 from ..model import Building
 from ..parametric.change import measure_rise, with_sizes
-from ..write.meshes.page_mesh import pack_values, solid_mesh
+from ..write.meshes.triangles import pack_values, solid_mesh
 from ..write.parameters import building_record, number
 
 MOST_PAGE_POINTS = 4000  # points drawn of a building, at most

@@ -21,8 +21,7 @@ from .areas import measure_faces
 from .far import TerrainHorizon, open_terrain, read_horizon
 from .horizon import SECTORS
 from .records import MOST_KEPT, Records
-from .sky import Sky, make_sky
-from .sun import Irradiation, irradiate, sample_face, sample_wall
+from .sun import Irradiation, Sky, irradiate, make_sky, sample_face, sample_wall
 from .town import Town
 from .walls import find_walls
 from .weather import import_pvlib, name_sky

@@ -20,7 +20,7 @@ from ..write.colours import (
     SURVEY_COLOURS,
     page_colours,
 )
-from ..write.meshes.page_mesh import pack_values, solid_mesh
+from ..write.meshes.triangles import pack_values, solid_mesh
 from .evaluation import TEXT_COLUMNS
 from .metrics import plan_outline, psd
 from .models import BuildingModel

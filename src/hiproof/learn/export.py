@@ -12,8 +12,7 @@ import torch
 from ..errors import InputError
 from ..segment.inference import FORMAT, INPUT_NAMES, OUTPUT_NAMES
 from ..segment.sampling import POINT_FEATURES
-from .batch import example_batch
-from .network import RoofNetwork
+from .network import RoofNetwork, example_batch
 
 
 def export(network: RoofNetwork, path: str | Path) -> Path:

@@ -15,10 +15,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+import numpy as np
 import torch
 from torch import nn
 
-from ..segment.arrange import Layout
+from ..segment.arrange import Arrangement, Layout, arrange
+from ..segment.inference import stack_arrangements
 from ..segment.sampling import POINT_FEATURES, POSITION_SCALE
 
 
@@ -173,3 +175,19 @@ class RoofNetwork(nn.Module):
 def gather_rows(x, index):
     """Return rows of `x` (rows, C) by `index` (S, K): (S, K, C)."""
     return x[index]
+
+
+def network_inputs(arrangements: list[Arrangement], layout: Layout) -> tuple[torch.Tensor, ...]:
+    """Return the network's nine inputs for a batch of buildings.
+
+    They are in the order of `segment.inference.INPUT_NAMES`.
+    """
+    return tuple(
+        torch.from_numpy(array) for array in stack_arrangements(arrangements, layout).values()
+    )
+
+
+def example_batch(layout: Layout) -> tuple[torch.Tensor, ...]:
+    """Return inputs of one generic cloud, to trace the network with."""
+    xyz = np.random.default_rng(0).uniform(0.0, 10.0, (2 * layout.points, 3))
+    return network_inputs([arrange(xyz, layout)], layout)

@@ -25,11 +25,10 @@ from ..progress import Update, count_progress, ignore_progress
 from ..segment.arrange import Layout, arrange
 from ..segment.scores import Scores
 from .augment import AugmentSettings, symmetric, vary_cloud
-from .batch import network_inputs
 from .card import write_card, write_curve
 from .data import open_source
 from .export import export, read_weights
-from .network import NetworkSettings, RoofNetwork
+from .network import NetworkSettings, RoofNetwork, network_inputs
 from .sample import TRAINING, VALIDATION, Sample, Source
 
 

@@ -202,6 +202,6 @@ def with_model(
     model = Model(roof, solid.move(roof.frame.origin), compose)
     if underside.is_level:
         return dataclasses.replace(building, built=model)
-    from ..compose.finish import add_underside
+    from ..compose.underside import add_underside
 
     return dataclasses.replace(building, built=add_underside(model, underside))

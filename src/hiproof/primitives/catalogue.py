@@ -4,7 +4,9 @@ A new shape is a row of data/shapes.toml; every test covers it.
 """
 
 from ..errors import SettingsError
-from . import cone, onion, shed, vault
+from . import cone, shed
+from . import revolved as onion
+from . import revolved as vault
 from .contract import Primitive
 from .table import SHAPE_ROWS, make_shape
 

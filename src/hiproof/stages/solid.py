@@ -71,7 +71,7 @@ def reach_terrain(building: Building, ground: Ground, settings: Settings) -> Bui
         return building
     if not ground.intersection:
         return add_remark(building, "its walls end at one level, for no terrain is known")
-    from ..compose.finish import add_underside
+    from ..compose.underside import add_underside
     from ..model import Underside
 
     origin = building.roof.frame.origin
@@ -107,8 +107,8 @@ def open_passages(
     passages = list_passages(footprint, building.shift)
     if building.built is None or not passages:
         return building
-    from ..compose.finish import add_passage
     from ..compose.settle import PLAN_DIGITS, round_number, settled_outline
+    from ..compose.underside import add_passage
 
     frame, model = building.roof.frame, building.model
     for polygon, clearance in passages:

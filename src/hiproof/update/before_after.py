@@ -19,7 +19,7 @@ from ..evaluate.report_pictures import building_pictures
 from ..evaluate.run import EvaluatedRun, evaluate_run
 from ..read.damage import Damaged, refuse
 from ..write.attribute_list import OWN
-from ..write.meshes.page_mesh import pack_values, solid_mesh
+from ..write.meshes.triangles import pack_values, solid_mesh
 
 MOST_CHANGE_POINTS = 2000
 """Points of a survey drawn of a building: at 10 points/m2 all of a house, 32 kB in the page."""

@@ -41,9 +41,8 @@ from .epochs import JUDGING_FILE, SURVEYS_FILE, Epochs, Surveys, select_roof
 from .judge import ChangeVerdict, judge_building
 from .kinds import Difference, name_differences, name_doubts
 from .lineage import continue_parts
-from .lost import LostParts
 from .members import UpdateMember, load_members
-from .moved import measure_moved, move_building
+from .moved import LostParts, measure_moved, move_building
 from .places import (
     demolish,
     end_building,

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..frames import METRES, Units
+from ..model.installation import CHIMNEY, ROOF_OBJECT
 
 NOT_IN_NAME = re.compile(r"[^A-Za-z0-9_.-]")
 
@@ -150,3 +151,10 @@ class FileUnits:
         """Return the units for the record of a run."""
         metres = {"metres_in_plan_unit": self.gml.plan, "metres_in_height_unit": self.gml.height}
         return {"coordinates": str(self.gml), "attributes": "metre", **metres}
+
+
+FUNCTIONS = {CHIMNEY: "1030", ROOF_OBJECT: "1070"}
+FUNCTION_SPACE = (
+    "http://www.sig3d.org/codelists/standard/building/2.0/BuildingInstallation_function.xml"
+)
+"""Codes of SIG3D: chimney, and others."""

@@ -97,7 +97,7 @@ def cut_into_parts(building: Building) -> tuple[BuildingPart, ...]:
     There are none where one would have no valid solid.
     """
     from ..compose.building_parts import building_parts
-    from ..compose.finish import finish_solid
+    from ..compose.underside import finish_solid
 
     model = building.model
     parts = building_parts(model.on_one_level)

@@ -23,8 +23,7 @@ from ...settings import WriteSettings
 from ..building_attributes import OWN, PREFIX
 from ..fragments import Fragment, Sheet
 from ..head import FileHead
-from ..installations import FUNCTION_SPACE, FUNCTIONS
-from ..naming import srs_name
+from ..naming import FUNCTION_SPACE, FUNCTIONS, srs_name
 from ..shapes import PartShape
 from ..values import WIDEST, format_attribute_set, generic_attribute, xml_attribute, xml_text
 from ..writer import BuildingWriter

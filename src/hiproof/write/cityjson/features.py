@@ -22,8 +22,7 @@ from ..building_attributes import OWN, PREFIX
 from ..files import scratch
 from ..fragments import Fragment, Sheet
 from ..head import FileHead
-from ..installations import FUNCTIONS
-from ..naming import reference_system
+from ..naming import FUNCTIONS, reference_system
 from ..shapes import PartShape
 from ..values import WIDEST, dump, metres
 from ..writer import BuildingWriter

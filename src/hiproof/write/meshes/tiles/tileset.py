@@ -21,9 +21,8 @@ from .... import __version__
 from ....errors import InputError, InputWarning, OutputError
 from ...files import hidden_name, output_error, remove, scratch
 from ..viewed import ViewedModel, merge_values
-from .content import tile_glb
+from .content import TileMesh, make_mesh, tile_glb
 from .globe import Globe, make_local_frame
-from .meshes import TileMesh, make_mesh
 from .properties import Found
 from .quadtree import MOST_TRIANGLES, Tile, quadtree
 
