@@ -41,7 +41,7 @@ import shapely
 from hiproof.model import Building, Roof
 from hiproof.parametric.building import build
 from hiproof.parametric.file import read_parameters
-from hiproof.read.pointcloud import read_points
+from hiproof.read.points.pointcloud import read_points
 from hiproof.simulate.city import City, Stock
 from hiproof.simulate.scanner import Scan, ScanSettings
 from hiproof.simulate.scene import building_bodies

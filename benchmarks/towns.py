@@ -31,7 +31,7 @@ import shapely
 
 from hiproof import reconstruct
 from hiproof.model import GROUND, Building, Solid
-from hiproof.read.solids import read_solids
+from hiproof.read.models.solids import read_solids
 from hiproof.simulate import SOURCES, Defects, ScanSettings, scan_solids
 from hiproof.status import Status
 from hiproof.write import write_all

@@ -39,7 +39,7 @@ from hiproof.evaluate.models import read_models
 from hiproof.evaluate.run import evaluate_run
 from hiproof.model import ROOF, Face, Part, Piece, Solid
 from hiproof.parametric.record import read_building
-from hiproof.read.damage import SkippedBuildings
+from hiproof.read.models.damage import SkippedBuildings
 from hiproof.write.colours import type_colour
 
 SETS = Path(__file__).resolve().parents[1].parent / "shared" / "data"

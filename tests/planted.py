@@ -12,7 +12,7 @@ from hiproof.city.plan.work_plan import make_jobs
 from hiproof.city.work import solve
 from hiproof.compiled import news
 from hiproof.model import Building, Quality
-from hiproof.read.footprints import read_footprints
+from hiproof.read.outlines.footprints import read_footprints
 from hiproof.status import Status
 from hiproof.update.tile import update_tile
 

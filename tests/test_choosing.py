@@ -18,7 +18,7 @@ from hiproof.city.run import reconstruct_area
 from hiproof.cli.app import app
 from hiproof.cli.reconstruct import find_settings_file
 from hiproof.errors import InputError, SettingsError
-from hiproof.read.footprints import read_footprints
+from hiproof.read.outlines.footprints import read_footprints
 from hiproof.settings import Settings
 from run_records import by_id
 from tiny_town import write_cloud

@@ -17,7 +17,7 @@ from hiproof.city.plan.prepare import make_plan
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.cli.running import print_summary
 from hiproof.errors import InputError, InputWarning
-from hiproof.read.positions import stretch
+from hiproof.read.crs.positions import stretch
 from hiproof.status import Doubt
 from tiny_town import ORIGIN, make_town, write_cloud, write_footprints, write_town
 

@@ -11,7 +11,7 @@ import planted
 from hiproof.city import run as city_run
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.errors import InputError
-from hiproof.read.pointcloud import read_points
+from hiproof.read.points.pointcloud import read_points
 from range_server import serve
 from read.test_pointcloud import write_copc, write_ply, write_text
 from run_records import RECORDS

@@ -215,7 +215,7 @@ def test_a_second_run_in_the_folder_is_refused_while_status_reads(town_files, tm
 
 def test_a_lock_holds_across_processes_and_ends_with_kill_9(tmp_path):
     code = "import sys, time\nfrom pathlib import Path\n"
-    code += "from hiproof.city.folder.lock import hold_folder\n"
+    code += "from hiproof.city.folder.marks import hold_folder\n"
     code += "with hold_folder(Path(sys.argv[1])):\n    print('held', flush=True)\n"
     code += "    time.sleep(60)"
     path = {**os.environ, "PYTHONPATH": str(Path(hiproof.__file__).parents[1])}

@@ -204,7 +204,7 @@ def test_overlapping_tiles_and_small_buffers_change_no_byte(reference_run, tmp_p
     chunks, flush = [], Gatherer.flush
     monkeypatch.setattr(Gatherer, "flush", lambda self: (chunks.append(self.number), flush(self)))
     monkeypatch.setattr("hiproof.city.work.sort.HELD_POINTS", 1000)
-    monkeypatch.setattr("hiproof.read.pointcloud.CHUNK_POINTS", 3000)
+    monkeypatch.setattr("hiproof.read.points.pointcloud.CHUNK_POINTS", 3000)
     town, rng = make_town(), np.random.default_rng(5)
     middle = np.median(town.xyz[:, 0])
     clouds = []
@@ -303,7 +303,7 @@ def test_an_index_beside_the_file_saves_points_and_changes_no_byte(
     reference_run, tmp_path, monkeypatch
 ):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
-    monkeypatch.setattr("hiproof.read.runs.RUN_POINTS", 50)
+    monkeypatch.setattr("hiproof.read.points.runs.RUN_POINTS", 50)
     town = make_town()
     along = np.argsort(town.xyz[:, 0].round(-1), kind="stable")
     cloud = write_cloud(tmp_path / "cloud.laz", town.xyz[along], town.classification[along])

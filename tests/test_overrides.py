@@ -247,7 +247,7 @@ def points_read(out):
 
 @pytest.mark.parametrize("keeps_points", ["noted", "lost", "of another file"])
 def test_what_is_redone_reads_the_points_near_it_alone(keeps_points, tmp_path, monkeypatch):
-    monkeypatch.setattr("hiproof.read.runs.RUN_POINTS", 50)
+    monkeypatch.setattr("hiproof.read.points.runs.RUN_POINTS", 50)
     town, out, path = make_town(), tmp_path / "out", tmp_path / "o.jsonl"
     flown = np.argsort(town.xyz[:, 0].round(-1), kind="stable")
     cloud = str(write_cloud(tmp_path / "cloud.laz", town.xyz[flown], town.classification[flown]))

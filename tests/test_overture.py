@@ -19,7 +19,7 @@ from hiproof.city.run import Request, reconstruct_area
 from hiproof.cli import main
 from hiproof.cli.reconstruct import find_settings_file
 from hiproof.errors import InputError, SettingsError
-from hiproof.read.footprints import read_footprints
+from hiproof.read.outlines.footprints import read_footprints
 from hiproof.settings import Settings
 from range_server import serve
 from run_records import RECORDS

@@ -18,7 +18,7 @@ from hiproof.cli.load import load
 from hiproof.errors import InputError, OutputError
 from hiproof.model.roof_figures import roof_figures
 from hiproof.parametric.run import build_file
-from hiproof.read.footprints import footprint_crs, read_footprints
+from hiproof.read.outlines.footprints import footprint_crs, read_footprints
 from hiproof.view.loading import load_postgis
 from hiproof.write import write_all, write_parameters
 from postgis_server import explain_absence, running
@@ -70,7 +70,7 @@ def test_a_table_gives_the_footprints_a_file_would(table):
 
 
 def test_the_reference_system_is_asked_for_without_reading_rows(table, monkeypatch):
-    monkeypatch.setattr("hiproof.read.database.DatabaseTable.rows", None)
+    monkeypatch.setattr("hiproof.read.outlines.database.DatabaseTable.rows", None)
     assert footprint_crs(table).to_epsg() == 28992
     assert footprint_crs(table + "&where=storeys=2").to_epsg() == 28992
     assert footprint_crs(table + "&where=storeys=99") is None

@@ -26,7 +26,7 @@ from hiproof.cli.app import app
 from hiproof.compose import check_solid
 from hiproof.errors import InputError
 from hiproof.evaluate.run import evaluate_run
-from hiproof.read.solids import read_solids
+from hiproof.read.models.solids import read_solids
 from hiproof.settings import Settings
 from tiny_town import make_town, write_cloud, write_footprints, write_town
 

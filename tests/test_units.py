@@ -27,7 +27,7 @@ from hiproof.frames import METRES, Units
 from hiproof.parametric.finished import open_run
 from hiproof.read import read_footprints, read_points, read_terrain
 from hiproof.read.crs import find_units
-from hiproof.read.solids import read_solids
+from hiproof.read.models.solids import read_solids
 from hiproof.settings import Settings
 from hiproof.write.tables.postgis import database_rows
 from read.test_lax import write_lax
@@ -245,7 +245,7 @@ def test_an_index_in_feet_is_asked_in_feet(tmp_path, monkeypatch):
     """COPC and `.lax` save points, but none that a building needs."""
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     monkeypatch.setattr("hiproof.city.work.sort.QUERY_M", 25.0)
-    monkeypatch.setattr("hiproof.read.runs.RUN_POINTS", 50)
+    monkeypatch.setattr("hiproof.read.points.runs.RUN_POINTS", 50)
     along = np.argsort(TOWN.xyz[:, 0].round(-1), kind="stable")
     xyz, classes, origin = (
         FEET.from_metres(TOWN.xyz[along]),

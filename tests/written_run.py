@@ -9,7 +9,7 @@ from lxml import etree
 from hiproof.compose import check_solid
 from hiproof.formats import list_requested_files
 from hiproof.parametric.run import build_file
-from hiproof.read.solids import read_solids
+from hiproof.read.models.solids import read_solids
 from hiproof.settings import Settings
 from hiproof.write import FileHead, fragments, join_fragments
 from hiproof.write.naming import gml_name

@@ -38,7 +38,7 @@ _HOME = {
     "read_points": "read",
     "read_footprints": "read",
     "read_terrain": "read",
-    "read_solids": "read.solids",
+    "read_solids": "read.models.solids",
     "write_citygml": "write",
     "write_cityjson": "write",
     "write_parameters": "write",

@@ -11,7 +11,7 @@ from hiproof.model import ROOF, Roof
 from hiproof.parametric.run import build_file
 from hiproof.primitives import CATALOGUE
 from hiproof.primitives.catalogue import CURVED
-from hiproof.read.solids import read_solids
+from hiproof.read.models.solids import read_solids
 from hiproof.settings import ComposeSettings, Settings
 from hiproof.write.head import FileHead
 from hiproof.write.parameters import write_parameters

@@ -21,7 +21,7 @@ from hiproof.edit.doubt import measure_doubt
 from hiproof.edit.edits import EDITS_FILE, UNTOUCHED, Edits, OtherVersion
 from hiproof.errors import HiproofError, InputError, InputWarning
 from hiproof.evaluate.run import evaluate_run
-from hiproof.read.solids import read_solids
+from hiproof.read.models.solids import read_solids
 from run_records import by_id
 
 ID = "house-0"

@@ -14,7 +14,7 @@ from hiproof.compose import check_solid
 from hiproof.edit.desk import Desk
 from hiproof.edit.edits import EDITS_FILE
 from hiproof.edit.server import Server, Service
-from hiproof.read.solids import read_solids
+from hiproof.read.models.solids import read_solids
 from pages import at_every_size, is_too_wide, list_complaints, needs_browser, project_on_canvas
 from run_records import by_id
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from fuzz.damaged_clouds import damaged_clouds, read_field, sound_clouds
 from hiproof.errors import InputError
-from hiproof.read.pointcloud import iter_points, read_header
+from hiproof.read.points.pointcloud import iter_points, read_header
 
 QUICK = settings(
     max_examples=60, deadline=None, suppress_health_check=list(HealthCheck), database=None

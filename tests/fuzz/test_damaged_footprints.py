@@ -13,7 +13,7 @@ from hiproof.city.plan.work_plan import WorkPlan, make_jobs
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.geometry.point_grid import PointGrid, grow_polygon
 from hiproof.model import Footprint
-from hiproof.read.polygons import WIDEST_BUILDING_M, simple_polygons
+from hiproof.read.outlines.polygons import WIDEST_BUILDING_M, simple_polygons
 from hiproof.settings import Settings
 from hiproof.stages.outline import MOST_OUTLINE_VERTICES, without_needless_vertices
 from run_records import by_id

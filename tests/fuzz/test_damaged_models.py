@@ -21,7 +21,7 @@ from hiproof.cli.convert import FormatName, convert
 from hiproof.cli.report import report
 from hiproof.errors import HiproofError
 from hiproof.evaluate.models import read_models
-from hiproof.read.solids import read_solids
+from hiproof.read.models.solids import read_solids
 from sample_models import SOLIDS, write_sample_run
 
 MODELS = "buildings.city.jsonl"

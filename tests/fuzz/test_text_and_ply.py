@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from hiproof.errors import InputError
 from hiproof.read.plausible import is_plausible
-from hiproof.read.pointcloud import iter_points, read_header
+from hiproof.read.points.pointcloud import iter_points, read_header
 from read.test_pointcloud import some_points, write_ply
 
 QUICK = settings(

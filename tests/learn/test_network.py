@@ -12,7 +12,7 @@ from hiproof.learn.export import export, read_weights  # noqa: E402
 from hiproof.learn.network import (  # noqa: E402
     NetworkSettings,
     RoofNetwork,
-    network_inputs,  # noqa: E402
+    network_inputs,
 )
 from hiproof.segment.arrange import Layout, arrange  # noqa: E402
 from hiproof.segment.inference import SHIPPED_WEIGHTS, load, run  # noqa: E402

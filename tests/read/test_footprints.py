@@ -13,9 +13,9 @@ from pyproj import CRS, Transformer
 from hiproof.city.plan.overlap import check_overlap
 from hiproof.errors import InputError, InputWarning
 from hiproof.model import Footprint
-from hiproof.read.footprints import footprint_crs, read_footprints
-from hiproof.read.polygons import simple_polygons
-from hiproof.read.positions import doubtful_place, refuse_degrees
+from hiproof.read.crs.positions import doubtful_place, refuse_degrees
+from hiproof.read.outlines.footprints import footprint_crs, read_footprints
+from hiproof.read.outlines.polygons import simple_polygons
 from hiproof.settings import Settings
 
 pytestmark = pytest.mark.filterwarnings(

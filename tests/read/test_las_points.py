@@ -4,8 +4,8 @@ import laspy
 import numpy as np
 import pytest
 
-from hiproof.read.las import read_points
-from hiproof.read.las_header import read_facts
+from hiproof.read.points.las import read_points
+from hiproof.read.points.las_header import read_facts
 
 COUNT = 120_000  # more than two of LASzip's chunks
 

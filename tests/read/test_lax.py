@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from hiproof.errors import InputWarning
-from hiproof.read.lax import read_lax
-from hiproof.read.pointcloud import iter_points
+from hiproof.read.points.lax import read_lax
+from hiproof.read.points.pointcloud import iter_points
 from read.test_pointcloud import write_las
 
 POINTS = 4000
@@ -85,7 +85,7 @@ def indexed_cloud(tmp_path):
 
 @pytest.mark.parametrize("seed", range(5))
 def test_the_runs_hold_every_point_of_any_boxes(indexed_cloud, seed, monkeypatch):
-    monkeypatch.setattr("hiproof.read.runs.RUN_POINTS", 10)
+    monkeypatch.setattr("hiproof.read.points.runs.RUN_POINTS", 10)
     path, xyz = indexed_cloud
     rng = np.random.default_rng(seed)
     lower = rng.uniform((610990, 6269990), (611380, 6270280), (3, 2))

@@ -11,7 +11,7 @@ import shapely
 from hiproof.city.plan.prepare import say_if_columns_run_out
 from hiproof.errors import InputError, InputWarning
 from hiproof.model import Footprint
-from hiproof.read.footprints import read_footprints
+from hiproof.read.outlines.footprints import read_footprints
 from hiproof.write.tables.geopackage import attributes_with_a_column
 
 SQUARES = [shapely.box(500000 + 20 * i, 4649776, 500010 + 20 * i, 4649786) for i in range(4)]

@@ -11,7 +11,7 @@ from pyproj.transformer import TransformerGroup
 
 from hiproof.errors import InputWarning
 from hiproof.read import read_footprints
-from hiproof.read.operations import Operation, find_operation, is_current
+from hiproof.read.crs.operations import Operation, find_operation, is_current
 from tiny_town import write_footprints
 
 LONDON = (530000.0, 180000.0)

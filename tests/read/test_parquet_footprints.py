@@ -11,7 +11,7 @@ import shapely
 from pyproj import CRS
 
 from hiproof.errors import InputError
-from hiproof.read.footprints import footprint_crs, read_footprints
+from hiproof.read.outlines.footprints import footprint_crs, read_footprints
 from range_server import serve
 
 pyarrow = pytest.importorskip("pyarrow", reason="the extra `parquet` is not installed")

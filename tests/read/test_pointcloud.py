@@ -11,15 +11,15 @@ import pytest
 
 from hiproof.errors import InputError, InputWarning
 from hiproof.frames import METRES
-from hiproof.read.las import is_copc
-from hiproof.read.pointcloud import (
+from hiproof.read.points.las import is_copc
+from hiproof.read.points.pointcloud import (
     expand_paths,
     iter_points,
     read_header,
     read_points,
     warn_coarse,
 )
-from hiproof.read.text import find_columns
+from hiproof.read.points.text import find_columns
 from hiproof.settings import Settings
 
 

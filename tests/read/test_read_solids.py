@@ -10,7 +10,7 @@ import pytest
 
 from hiproof.compose import check_solid, compose
 from hiproof.errors import InputError
-from hiproof.read.solids import read_solids
+from hiproof.read.models.solids import read_solids
 from roof_zoo import generate_roof
 
 DEN_HAAG = Path(__file__).parents[2] / "../shared/data/denhaag/DenHaag_01.city.json"

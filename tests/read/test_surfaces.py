@@ -13,9 +13,9 @@ import pytest
 import shapely
 
 from hiproof.errors import InputError, InputWarning
-from hiproof.read.footprints import footprint_crs, read_footprints
-from hiproof.read.polygons import is_surface, simple_polygons
-from hiproof.read.wkb import as_polygons, decode_geometries
+from hiproof.read.outlines.footprints import footprint_crs, read_footprints
+from hiproof.read.outlines.polygons import is_surface, simple_polygons
+from hiproof.read.outlines.wkb import as_polygons, decode_geometries
 
 pytestmark = pytest.mark.filterwarnings("ignore::hiproof.errors.InputWarning")
 X, Y = 500000.0, 4649776.0

@@ -12,8 +12,7 @@ from rasterio.transform import from_origin
 
 from hiproof.errors import InputError
 from hiproof.geometry.thin import thin_to_grid
-from hiproof.read import raster
-from hiproof.read.terrain import TerrainChain, read_terrain
+from hiproof.read.terrain import TerrainChain, raster, read_terrain
 
 WEST, NORTH = 85000.0, 446200.0
 

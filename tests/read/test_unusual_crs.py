@@ -16,9 +16,9 @@ from hiproof.city.plan.prepare import read_headers
 from hiproof.city.run import Request
 from hiproof.errors import InputError, InputWarning
 from hiproof.read.crs import UnknownCRS, find_units, names_place, parse_crs, vertical_crs
-from hiproof.read.footprints import read_footprints
-from hiproof.read.las_crs import las_crs
-from hiproof.read.pointcloud import read_header, read_points
+from hiproof.read.outlines.footprints import read_footprints
+from hiproof.read.points.las_crs import las_crs
+from hiproof.read.points.pointcloud import read_header, read_points
 from hiproof.read.terrain import read_terrain
 from hiproof.settings import Settings
 

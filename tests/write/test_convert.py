@@ -19,7 +19,7 @@ from hiproof.cli.convert import convert
 from hiproof.errors import InputError
 from hiproof.formats import CONVERTED, FORMATS
 from hiproof.parametric.run import build_file
-from hiproof.read.solids import read_solids
+from hiproof.read.models.solids import read_solids
 from hiproof.write.colours import WALL_COLOUR, srgb
 
 SCHEMAS = Path(__file__).parents[3] / "shared" / "schemas"

@@ -20,7 +20,7 @@ from hiproof.geometry.rings import ring_normal
 from hiproof.model import GROUND, ROOF, Building, Model, Part, Piece, Quality, Roof
 from hiproof.parametric.finished import open_run
 from hiproof.parametric.run import build_file
-from hiproof.read.solids import read_solids
+from hiproof.read.models.solids import read_solids
 from hiproof.settings import WriteSettings
 from hiproof.status import Status
 from hiproof.write import (

@@ -11,8 +11,8 @@ import hiproof
 from hiproof.cli.convert import convert
 from hiproof.errors import InputError, InputWarning
 from hiproof.evaluate.models import read_models
-from hiproof.read.footprints import read_footprints
-from hiproof.read.solids import read_solids
+from hiproof.read.models.solids import read_solids
+from hiproof.read.outlines.footprints import read_footprints
 
 CORNERS = np.array([[i, j, k] for k in (0, 6) for i, j in ((0, 0), (10, 0), (10, 10), (0, 10))])
 SHELL = [(0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)]
@@ -147,7 +147,7 @@ def test_footprints_whose_crs_is_unknown_are_taken_to_be_in_that_of_the_clouds(
     tmp_path, monkeypatch
 ):
     """No file of GDAL names such a CRS at will, so a reader does."""
-    from hiproof.read import vector_file
+    from hiproof.read.outlines import vector_file
 
     real = vector_file.read_vector_file
 

@@ -9,7 +9,7 @@ import pytest
 from lxml import etree
 
 from handmade import box, courtyard, gable_house, make_building, make_lost_building
-from hiproof.read.solids import read_solids
+from hiproof.read.models.solids import read_solids
 from hiproof.write.citygml.version2 import NAMESPACES as OLD
 from hiproof.write.citygml.version2 import write_citygml
 from hiproof.write.citygml.version3 import ID, NAMESPACES_3, upgrade_member, write_citygml3

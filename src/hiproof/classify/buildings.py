@@ -9,7 +9,7 @@ import numpy as np
 import scipy
 
 from ..geometry.point_grid import PointGrid
-from ..read.pointcloud import Box
+from ..read.points.pointcloud import Box
 from .cells import SquareCells, plan_density
 from .ground import ground_grid
 from .surfaces import Surfaces, find_surfaces

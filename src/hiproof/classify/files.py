@@ -13,10 +13,10 @@ import numpy as np
 from ..errors import InputError, OutputError
 from ..frames import Units
 from ..read.crs import find_units, parse_crs
-from ..read.las import read_checked_facts, translate_errors
-from ..read.las_crs import las_crs
-from ..read.pointcloud import common_crs, file_kind, refuse_implausible
-from ..read.positions import refuse_degrees
+from ..read.crs.positions import refuse_degrees
+from ..read.points.las import read_checked_facts, translate_errors
+from ..read.points.las_crs import las_crs
+from ..read.points.pointcloud import common_crs, file_kind, refuse_implausible
 from ..settings import Settings
 from ..write.files import atomic, refuse_overwriting
 from .buildings import BUILDING, GROUND_CLASS, UNKNOWN, classify

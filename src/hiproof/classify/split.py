@@ -19,7 +19,7 @@ from ..errors import ErrorReport, InputError, InputWarning, report_error
 from ..geometry.components import label_components
 from ..log import count_things
 from ..model import PointCloud
-from ..read.pointcloud import Box
+from ..read.points.pointcloud import Box
 from ..settings import ReadSettings, Settings
 from .buildings import find_squares, list_squares
 from .cells import plan_density

@@ -91,8 +91,8 @@ def check_file(
     Prints a line for each invalid one and a count at the end.
     """
     from ..compose import check_solid
-    from ..read.damage import SkippedBuildings
-    from ..read.solids import read_solids
+    from ..read.models.damage import SkippedBuildings
+    from ..read.models.solids import read_solids
 
     result, left_out = CheckedFile(path), SkippedBuildings()
     for id, solid in read_solids(path, left_out):

@@ -12,7 +12,7 @@ from ..errors import InputError, OutputError
 from ..formats import CONVERTED, choose_format
 from ..log import count_things
 from ..progress import Update, count_progress, show_progress
-from ..read.damage import SkippedBuildings
+from ..read.models.damage import SkippedBuildings
 
 FormatName = StrEnum("FormatName", {name: name for name in CONVERTED})  # type: ignore[misc]
 DEFAULT = "glb"

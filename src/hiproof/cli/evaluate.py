@@ -59,7 +59,7 @@ def evaluate(
     with show_progress("measure"):
         from ..evaluate.evaluation import summarise, to_csv, to_json
         from ..evaluate.run import evaluate_run
-        from ..read.damage import SkippedBuildings
+        from ..read.models.damage import SkippedBuildings
         from ..write.files import atomic_file, elsewhere, refuse_overwriting
 
         place = Path(out or folder)

@@ -46,7 +46,7 @@ def fetch_footprints(
     from ..city.plan.from_overture import keep_footprints
     from ..city.plan.prepare import read_headers
     from ..city.request import Request
-    from ..read.pointcloud import expand_paths
+    from ..read.points.pointcloud import expand_paths
     from ..settings import Settings
     from ..write.files import refuse_overwriting, refuse_run_file
     from .reconstruct import find_settings_file

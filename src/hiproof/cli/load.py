@@ -9,7 +9,7 @@ import click
 from ..errors import InputError
 from ..log import count_things
 from ..progress import show_progress
-from ..read.damage import SkippedBuildings
+from ..read.models.damage import SkippedBuildings
 
 
 def load(

@@ -120,7 +120,7 @@ def find_settings_file(*inputs: str | None) -> Path | None:
 
     Raises SettingsError where there are two: which of them counts is not to be guessed.
     """
-    from ..read.overture import is_overture
+    from ..read.outlines.overture import is_overture
 
     named = [name for name in inputs if name and "://" not in name and not is_overture(name)]
     paths = [Path(name) for name in named]

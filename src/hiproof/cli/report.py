@@ -30,7 +30,7 @@ def report(
     with show_progress("measure"):
         from ..evaluate.report import write_report
         from ..evaluate.run import evaluate_run
-        from ..read.damage import SkippedBuildings
+        from ..read.models.damage import SkippedBuildings
         from ..update.before_after import draw_changes, evaluate_earlier
         from ..write.files import elsewhere, refuse_overwriting, refuse_run_file
 

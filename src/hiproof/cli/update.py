@@ -41,7 +41,7 @@ def update(
     building has a model or a reason why not, 1 an internal error, 2 unusable input.
     """
     with show_progress("plan") as progress:
-        from ..read.pointcloud import expand_paths
+        from ..read.points.pointcloud import expand_paths
         from ..update.earlier import find_parameters
         from ..update.request import UpdateRequest
         from ..update.run import update_area

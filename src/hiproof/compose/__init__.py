@@ -10,7 +10,6 @@ cells             outline, pieces and the lines where the active plane changes a
 zones             places where a solid failed, and what is attempted there
 arrangement       the planar arrangement under them, on an integer grid
 buckets           what lies near a place, for it
-joined            sets that are joined, for it
 levels            which heights meet over every vertex of the plan
 flat_corners      corners turned in where rounded heights would fold a face
 shell             roof, wall and ground faces that share them
@@ -18,14 +17,11 @@ check             whether the result is valid by ISO 19107
 check_faces       its rules for each face by itself
 check_shell       its rules for the shell of sound faces
 bends             which faces are bent (val3dity's 204)
-blocks            LoD1: prisms over the outline
-profile           heights of the terrain along an outline
+blocks            LoD1: prisms over the outline; installations on roofs
 underside         walls down to the terrain, and passages below a solid
 overhang          slabs of a roof beyond walls
 eaves             a model with overhangs
 valid_eaves       as many overhangs as make a valid solid
-finish            a model with the underside that it is to have
-boxes             installations on roofs
 building_parts    a solid cut where its roofs meet, for formats that know building parts
 """
 

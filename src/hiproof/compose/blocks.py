@@ -1,4 +1,4 @@
-"""Blocks of LoD1: one prism over a building's outline, or several."""
+"""Blocks of LoD1: one prism over a building's outline, or several; boxes on roofs."""
 
 from __future__ import annotations
 

@@ -1,6 +1,7 @@
 """The underside of a solid that does not stand on one level.
 
-Its walls reach down to the terrain, and passages lead through below it.
+Its walls reach down to the terrain, and passages lead through below it. `finish_solid`
+gives a model the underside that it is to have.
 
 The solid over one level is composed first. Its ground is cut in plan into cells: the ground itself,
 and each passage. Then walls get new feet, cells at different heights get a wall between them, a

@@ -24,7 +24,7 @@ from ..log import LOGGER
 from ..parametric.building import build
 from ..parametric.record import list_at, number, text_at
 from ..primitives.catalogue import CATALOGUE
-from ..read.damage import finite
+from ..read.models.damage import finite
 from ..status import Attention
 from ..write.meshes.triangles import pack_values
 from ..write.parameters import building_record

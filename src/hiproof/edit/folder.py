@@ -12,7 +12,7 @@ from typing import Any
 from ..errors import InputError
 from ..parametric.file import DAMAGED, objects, parse_object, read_head
 from ..parametric.record import refuse_other_kinds
-from ..read.damage import SkippedBuildings, excerpt
+from ..read.models.damage import SkippedBuildings, excerpt
 from ..settings import Settings
 from ..status import Attention, find_attention
 from ..write.head import FileHead

@@ -24,7 +24,7 @@ from ..evaluate.inputs import found_inputs
 from ..evaluate.run import run_record
 from ..geometry.thin import thin_to_count
 from ..parametric.record import read_outline
-from ..read.raster import import_rasterio
+from ..read.terrain.raster import import_rasterio
 from ..stages.points import distinct, usable
 
 # work tiles and buildings whose points stay in memory: those a person goes back and forth between

@@ -10,8 +10,7 @@ house_type  the type of a house by the houses that it touches, its size, and its
 horizon     the horizon that buildings make around places on roofs, compiled
 far         the horizon of a terrain model, or of a file as PVGIS has it
 weather     the irradiance of a typical year: EPW, TMY3, PVGIS, or a clear sky
-sky         the sun and the sky of a year at a place, from pvlib
-sun         the sun on a face: irradiation by month
+sun         the sun and the sky of a year at a place, and on a face: irradiation by month
 cadastre    the sun on every roof and wall of a building
 energy      thermal zones and their boundaries in the Energy ADE
 answer      all answers about one building

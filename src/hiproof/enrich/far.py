@@ -10,8 +10,8 @@ import numpy as np
 
 from ..errors import InputError
 from ..read.crs import find_units, parse_crs
-from ..read.raster import RasterTerrain
 from ..read.terrain import read_terrain
+from ..read.terrain.raster import RasterTerrain
 from .horizon import SECTORS
 from .records import Records
 from .weather import EARTH_RADIUS_KM

@@ -1,5 +1,7 @@
 """The sun on a face: irradiation by month, shaded by buildings and terrain.
 
+The sun and the sky of a year at a place come from pvlib.
+
 The sky is Hay and Davies': light from the sun's direction, circumsolar light included, is shaded
 where the sun stands below the horizon of a place; the isotropic light is weighted by the part of
 the sky that a place sees; light reflected by the ground is not shaded.

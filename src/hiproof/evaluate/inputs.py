@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..read.damage import excerpt
+from ..read.models.damage import excerpt
 from ..read.plausible import is_place
 from ..read.remote import is_url
 

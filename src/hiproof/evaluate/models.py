@@ -20,10 +20,10 @@ from ..errors import InputError
 from ..formats import FORMATS, TILE_FOLDER
 from ..frames import METRES, Units
 from ..model import GROUND, ROOF, Face, Solid
-from ..read.cityjson import UNUSABLE, Feature, features, unusable
-from ..read.damage import Damaged, excerpt, finite, refuse
+from ..read.models.cityjson import UNUSABLE, Feature, features, unusable
+from ..read.models.damage import Damaged, excerpt, finite, refuse
+from ..read.models.shells import ShellSurface, read_geometries, read_shell, require_list
 from ..read.plausible import is_plausible
-from ..read.shells import ShellSurface, read_geometries, read_shell, require_list
 from ..write.attribute_list import OWN
 from ..write.meshes.triangles import faces_triangles
 

@@ -14,9 +14,9 @@ import shapely
 
 from ..errors import InputError, InputWarning, SettingsError
 from ..frames import Units
-from ..read.cityjson import parse_object, read_text
 from ..read.crs import find_units, parse_crs
-from ..read.damage import Damaged, excerpt, refuse
+from ..read.models.cityjson import parse_object, read_text
+from ..read.models.damage import Damaged, excerpt, refuse
 from ..settings import Settings
 from ..status import Attention
 from ..write.attribute_list import OWN
@@ -237,7 +237,7 @@ def building_points(
 
     Of clouds without classes they are all points.
     """
-    from ..read.pointcloud import expand_paths, read_points, refuse_other_crs
+    from ..read.points.pointcloud import expand_paths, read_points, refuse_other_crs
 
     settings = run_settings(record)
     if not settings.read.crs:
@@ -265,7 +265,7 @@ def match_footprints(
     """
     if path is None:
         return [None] * len(models)
-    from ..read.footprints import read_footprints
+    from ..read.outlines.footprints import read_footprints
 
     footprints = read_footprints(
         path, layer, target_crs=run_crs(record), settings=run_settings(record), **options

@@ -8,8 +8,7 @@ The package has the network, data sets, training and export.
     roofn3d    RoofN3D's real clouds
     data       the source that a name stands for
     augment    random scaling, dropping, jittering, and the roof's symmetries
-    batch      arranged clouds as the network's tensors
-    network    PointNet++ in PyTorch
+    network    PointNet++ in PyTorch, and arranged clouds as its tensors
     training   the recipe, checkpoints and the best by validation
     export     to the ONNX file that `segment` runs
     card       training curve and model card

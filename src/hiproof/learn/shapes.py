@@ -15,8 +15,8 @@ import shapely
 from ..errors import InputError
 from ..model import GROUND, ROOF, Solid
 from ..primitives.catalogue import CATALOGUE
-from ..read.cityjson import features
-from ..read.solids import read_solids
+from ..read.models.cityjson import features
+from ..read.models.solids import read_solids
 
 # Types that share a code (both gables) are read as the first, the commoner one; 1120 is a pyramidal
 # broach.

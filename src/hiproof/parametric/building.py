@@ -25,7 +25,7 @@ from ..model import (
 )
 from ..model.installation import CHIMNEY, ROOF_OBJECT
 from ..model.overhang import ROOF_EDGE, WALLS
-from ..read.damage import excerpt
+from ..read.models.damage import excerpt
 from ..settings import ComposeSettings, Settings
 from ..write.attribute_list import TABLES
 from .record import (

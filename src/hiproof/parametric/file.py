@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, SettingsError
-from ..read.cityjson import ESCAPED
 from ..read.crs import NAMED_UNITS, parse_crs
-from ..read.damage import Damaged, excerpt, readable, refuse
+from ..read.models.cityjson import ESCAPED
+from ..read.models.damage import Damaged, excerpt, readable, refuse
 from ..read.plausible import is_place
 from ..settings import Settings
 from ..write.head import FileHead

@@ -23,10 +23,10 @@ from ..formats import FORMATS
 from ..frames import LocalFrame
 from ..geometry.rings import repair_polygons, ring_normal, ring_normals
 from ..model import GROUND, ROOF, WALL, Building, Face, Model, Part, Piece, Roof, Solid
-from ..read.cityjson import documents, reference_system
 from ..read.crs import find_units, parse_crs, read_named_crs
-from ..read.damage import Damaged, refuse
-from ..read.solids import CITYGML_SUFFIXES, find_citygml_crs, read_building_solids
+from ..read.models.cityjson import documents, reference_system
+from ..read.models.damage import Damaged, refuse
+from ..read.models.solids import CITYGML_SUFFIXES, find_citygml_crs, read_building_solids
 from ..settings import ComposeSettings
 from ..status import Status
 from ..write.building_attributes import building_attributes, measure_figures

@@ -30,7 +30,7 @@ from ..errors import FitError, HiproofError, InputError
 from ..frames import LocalFrame
 from ..model import Building, Footprint, as_xyz
 from ..primitives.catalogue import CATALOGUE
-from ..read.damage import excerpt
+from ..read.models.damage import excerpt
 from ..read.plausible import HIGHEST_BUILDING_M, HIGHEST_LAND_M, LOWEST_LAND_M
 from ..settings import Settings
 from ..stages.footprint import align_footprint, start_building

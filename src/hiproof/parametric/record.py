@@ -29,7 +29,7 @@ from ..geometry.rings import repair_polygons
 from ..model import Building, Part, Quality, Roof
 from ..primitives.catalogue import CATALOGUE
 from ..primitives.parameters import refuse_no_shape
-from ..read.damage import excerpt
+from ..read.models.damage import excerpt
 from ..status import Change, Grade, Status
 from ..write.attribute_list import TABLES
 from ..write.head import UpdateHead

@@ -26,7 +26,7 @@ from ..formats import FORMATS, list_model_paths, list_requested_files
 from ..log import LOGGER
 from ..masking import mask, masked_values
 from ..model import Building
-from ..read.damage import finite
+from ..read.models.damage import finite
 from ..settings import Settings
 from ..status import Status
 from ..write.cityjson.features import choose_offset

@@ -1,6 +1,7 @@
 """Turn a profile of chords around an axis: rings of facets, the innermost first.
 
-Domes and onions are made so. facets.py draws their profiles.
+Domes and onions are made so. facets.py draws their profiles. A barrel vault has its chords along a
+ridge. An onion is a bulge, and above its neck a hollow pointed top.
 """
 
 from __future__ import annotations

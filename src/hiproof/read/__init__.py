@@ -1,51 +1,53 @@
 """From files to values: point clouds, footprints, terrain, RoofN3D, models.
 
-pointcloud    points of any kind of file, in chunks; `read_points`
-remote        files by address
-las           LAS, LAZ and COPC, checked against what their headers say
-las_header    whether what such a file says of itself is possible
-las_crs       the one that its records define
-runs          where the points of a file lie, run by run
-lax           LAStools' index beside a file
-ply           PLY files
-text          XYZ, CSV and the like
-numbers       numbers in columns that people fill
-columns       which column of a table of points holds what
-plausible     what no input may say
+points        point clouds; `read_points`
+    pointcloud    points of any kind of file, in chunks
+    las           LAS, LAZ and COPC, checked against what their headers say
+    las_header    whether what such a file says of itself is possible
+    las_crs       the CRS that its records define
+    runs          where the points of a file lie, run by run
+    lax           LAStools' index beside a file
+    ply           PLY files
+    text          XYZ, CSV and the like, and which column holds what
+outlines      building polygons; `read_footprints`
+    footprints    footprints of any source
+    attribute_columns  their attributes as they are declared; names in SQL
+    vector_file   features of a vector file, by GDAL
+    wkb           its geometries, surfaces in space among them
+    polygons      polygons put right
+    database      footprints from PostGIS
+    geoparquet    GeoParquet files, of which only the row groups around an extent are fetched
+    overture      footprints of an Overture Maps release
+terrain       how high the ground is; `read_terrain`
+    raster        terrain models
+    raster_checks whether a raster can be one, and in which unit it counts
+models        models of other files
+    cityjson      documents of CityJSON with their vertices in place
+    damage        what becomes of a damaged building in a file of many
+    shells        shells of CityJSON, every number checked
+    solids        solids of CityJSON and CityGML as they stand
 crs           reference systems and their units
-axes          what no roof can be built in is refused
-operations    which operation of PROJ lies between two of them, and how accurate it is
-footprints    building polygons; `read_footprints`
-attribute_columns  their attributes as they are declared
-sql           names in SQL
-vector_file   features of a vector file, by GDAL
-wkb           its geometries, surfaces in space among them
-polygons      polygons put right
-database      footprints from PostGIS
-geoparquet    GeoParquet files, of which only the row groups around an extent are fetched
-overture      footprints of an Overture Maps release
-positions     positions in a CRS: reprojected, doubted, described
-terrain       how high the ground is
-raster        terrain models
-raster_checks whether a raster can be one, and in which unit it counts
-cityjson      documents of CityJSON with their vertices in place
-damage        what becomes of a damaged building in a file of many
-shells        shells of CityJSON, every number checked
-solids        solids of CityJSON and CityGML as they stand
+    axes          what no roof can be built in is refused
+    operations    which operation of PROJ lies between two of them, and how accurate it is
+    positions     positions in a CRS: reprojected, doubted, described
 roofn3d       the RoofN3D data set
+remote        files by address
+numbers       numbers in columns that people fill
+plausible     what no input may say
 
 Everything unreadable raises `errors.InputError` with one sentence; what was put right on the way is
 said by `errors.InputWarning`. docs/libraries.md says why code stands here beside laspy and pyogrio.
-The names below are imported when first used: GDAL costs a third of a
-second.
+The names below are imported when first used: GDAL costs a third of a second.
 """
 
 from importlib import import_module
 from typing import Any
 
 _HOME = {
-    **dict.fromkeys(("read_points", "iter_points", "read_header", "PointFileHeader"), "pointcloud"),
-    **dict.fromkeys(("read_footprints", "footprint_crs"), "footprints"),
+    **dict.fromkeys(
+        ("read_points", "iter_points", "read_header", "PointFileHeader"), "points.pointcloud"
+    ),
+    **dict.fromkeys(("read_footprints", "footprint_crs"), "outlines.footprints"),
     **dict.fromkeys(("read_terrain", "Terrain", "TerrainChain"), "terrain"),
     **dict.fromkeys(("read_roofn3d", "read_roofn3d_labels", "RoofN3DRecord"), "roofn3d"),
     **dict.fromkeys(("same_horizontal", "combine", "parse_crs"), "crs"),

@@ -183,7 +183,7 @@ def polygon(wkt: str) -> shapely.Polygon:
     """Return the largest polygon of a WKT field, empty for an empty field."""
     if not wkt.strip():
         return shapely.Polygon()
-    from .polygons import simple_polygons
+    from .outlines.polygons import simple_polygons
 
     return max(simple_polygons(shapely.from_wkt(wkt)), key=lambda part: part.area)
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import FitError, InputError, OutputError
 from ..frames import METRES, Units
-from ..read.pointcloud import read_points
+from ..read.points.pointcloud import read_points
 from ..settings import Settings
 from .inference import SHIPPED_WEIGHTS, Segmentation, load, segment
 

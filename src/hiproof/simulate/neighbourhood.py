@@ -88,7 +88,7 @@ def write_neighbourhood(folder: Path, seed: int = DEMO_SEED) -> dict[str, int]:
     Made by `python -m hiproof.simulate neighbourhood FOLDER`. Raises InputError without rasterio
     (the extra `terrain`).
     """
-    from ..read.raster import import_rasterio
+    from ..read.terrain.raster import import_rasterio
 
     import_rasterio()
     lots, terrain = neighbourhood(seed)

@@ -195,7 +195,7 @@ def write_laz(path: Path, clouds: Iterator[Scan], origin: np.ndarray, scale_m: f
 
 def write_terrain(path: Path, bounds: Bounds, terrain: Relief, pixel_m: float = 1.0) -> None:
     """Write terrain heights at the pixel centres as a GeoTIFF."""
-    from ..read.raster import import_rasterio
+    from ..read.terrain.raster import import_rasterio
 
     rasterio = import_rasterio()
     from rasterio.transform import from_origin

@@ -4,7 +4,7 @@ Each building is tested against the new points; what did not change stays.
 
 request    what the user asked for
 earlier    the earlier run: its parameters, settings and clouds
-dates      when the new points were surveyed
+dates      when the new points were surveyed, and surveys as the user names them
 members    the buildings of an update: earlier ones, and those of new footprints
 plan       the plan of the update, from the earlier buildings
 register   the common shift between the two surveys
@@ -15,8 +15,7 @@ judge      the class of a building: unchanged, changed, gone, ...
 kinds      what changed: a part raised, a dormer built, ...
 before     the earlier points sorted and the surveys registered, before there are work tiles
 lineage    parts of the new roof that continue parts of the earlier one
-moved      the earlier model with parts moved up or down, where only these changed
-lost       parts that were pulled down, which the new model loses
+moved      the earlier model with parts moved up or down, or without those pulled down
 places     places that changed as parameters.jsonl holds them, roofs in one frame
 outside    roofs outside all outlines
 texts      texts of unchanged buildings, taken from the earlier run
@@ -24,8 +23,7 @@ epochs     the surveys, and the points of both in a work tile
 refine     parameters of unchanged buildings, estimated by the points of both surveys
 solve      a work tile brought up to date
 tile       that, by name, for processes that have imported nothing yet
-named      surveys as the user names them for a run of several
-several    such a run: its surveys registered, and its tiles solved
+several    a run of several surveys: these registered, and its tiles solved
 best       the best survey of each building, and the model made of it
 run        the steps above, one after the other
 change_tables  changes.csv and changes.gpkg: what the update found

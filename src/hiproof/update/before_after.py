@@ -17,7 +17,7 @@ from ..evaluate.models import BuildingModel
 from ..evaluate.report import read_asset
 from ..evaluate.report_pictures import building_pictures
 from ..evaluate.run import EvaluatedRun, evaluate_run
-from ..read.damage import Damaged, refuse
+from ..read.models.damage import Damaged, refuse
 from ..write.attribute_list import OWN
 from ..write.meshes.triangles import pack_values, solid_mesh
 

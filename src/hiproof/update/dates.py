@@ -1,7 +1,8 @@
 """The date of a survey.
 
 It is named, or comes from the time of points, or from a file's header. Only days on which a survey
-can have been made are used.
+can have been made are used. A run of several surveys names them:
+`--epoch 2014=a/ --epoch 2020-05-01=b/`.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import numpy as np
 
 from ..errors import InputError, InputWarning
 from ..masking import mask
-from ..read.pointcloud import expand_paths
+from ..read.points.pointcloud import expand_paths
 from ..read.remote import is_url
 
 GPS_EPOCH = datetime.datetime(1980, 1, 6)  # when GPS time begins

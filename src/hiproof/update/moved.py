@@ -1,7 +1,9 @@
-"""The earlier model with parts moved up or down, where only these changed.
+"""The earlier model with parts moved up or down, or pulled down.
 
 It takes the place of a search where the earlier points, moved with their parts, pass the test of an
 update against the new ones. So nothing but heights changes.
+
+Parts were pulled down where their ground lies bare in the new survey.
 """
 
 from __future__ import annotations

@@ -26,7 +26,7 @@ from ..city.plan.work_plan import (
 from ..errors import InputError, InputWarning
 from ..masking import mask
 from ..read.crs import describe_crs, find_units, same_horizontal
-from ..read.positions import format_box
+from ..read.crs.positions import format_box
 from ..settings import Settings
 from ..write.files import atomic
 from ..write.parameters import crs_text

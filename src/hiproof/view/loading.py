@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from ..parametric.finished import open_run
-from ..read.damage import Damaged, refuse
+from ..read.models.damage import Damaged, refuse
 from ..write.naming import reference_system
 from ..write.tables.postgis import Load, load_tables
 

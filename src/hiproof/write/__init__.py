@@ -8,19 +8,16 @@ attribute_list         every attribute and table, declared once
 building_attributes    the attributes of one building
 roof_figures           heights, slopes, ridge and volume of a solid
 surfaces               faces that are one surface, such as the facets of a cone
-installations          codes of chimneys and other objects on roofs
 shapes                 LoD0, blocks and building parts, as far as requested
 colours                one colour a roof type
-values                 numbers and text as every format holds them
-xml_text, json_text    values in XML and in JSON
-naming                 ids, names of reference systems, units
+values                 numbers and text as every format holds them, in XML and JSON, too
+naming                 ids, names of reference systems, units, codes of objects on roofs
 reprojected            coordinates in another reference system than the run's
 
 Files:
 
 writer       a file is opened, given one building after another, finished
-files        files that appear whole or not at all
-overwriting  whether a file to write stands for an input or a run's own file
+files        files that appear whole or not at all, and stand for no input or run's own file
 head         what all files of a run have in common
 fragments    one building's texts, kept until they are joined
 described    a building with its attributes, into a file of any format

@@ -5,6 +5,8 @@ They are written beside their place under a hidden name, synced, then renamed.
 Whatever goes wrong on the way (an exception, Ctrl-C, a full disk), the half-written file is removed
 and a file that stood there before keeps its content. What the file system refuses becomes an
 OutputError, a full sentence for the user; errors of the caller's own code pass through unchanged.
+
+A file that stands for an input, or for a file of a run, is refused.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Names in files: gml:ids, CRSs and units.
+"""Names in files: gml:ids, CRSs, units and codes of installations.
 
 Ids are valid, unique and the same in every run.
 """

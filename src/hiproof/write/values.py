@@ -1,4 +1,4 @@
-"""Single values for every format: rounded numbers, plain types, clean text."""
+"""Single values for every format: rounded numbers, plain types, clean text, JSON, XML."""
 
 from __future__ import annotations
 

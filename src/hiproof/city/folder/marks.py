@@ -1,8 +1,12 @@
-"""The mark by which an output folder knows whose run it holds.
+"""The mark by which an output folder knows whose run it holds, and its lock: one run at a time.
 
 The mark is made of every field of the request, of what stands in the files that it names, and of
 the version. A field takes no part only where its declaration says what else it decides: one that is
 added later cannot be forgotten.
+
+The lock ends with its process, however that ends. SQLite does the locking, as it does for the
+ledger: the standard library's, one way on every system, across processes and over network drives
+that know locks. It has a file of its own, so that `hiproof status` still reads the ledger.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
 """A run's own folder.
 
-It is opened, compared with the request, and resumed or begun anew.
+It is opened, compared with the request, and resumed or begun anew. A building's answer depends on
+the building alone: where its digest is the same, its texts still hold, although footprints,
+overrides, the choice of buildings or the work tiles changed.
 """
 
 from __future__ import annotations
@@ -216,7 +218,7 @@ def refuse_other_operations(out: Path, plan: WorkPlan) -> None:
 
     That is another way than when the run was planned.
     """
-    from ...read.operations import is_current
+    from ...read.crs.operations import is_current
 
     changed = [operation for operation in plan.operations if not is_current(operation)]
     if changed:

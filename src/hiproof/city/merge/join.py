@@ -1,6 +1,7 @@
 """Joining of the workers' texts into the output files.
 
-It goes in plan order, with one tile in memory at a time.
+It goes in plan order, with one tile in memory at a time. Size and digest of each file are kept in
+the ledger, and show whether it still stands.
 """
 
 from __future__ import annotations

@@ -67,10 +67,10 @@ def refuse_missing_packages(request: Any) -> None:
 
     Most requests do not need it.
     """
-    from ...read import geoparquet
-    from ...read.database import import_psycopg, is_database
-    from ...read.geoparquet import is_parquet
-    from ...read.overture import is_overture
+    from ...read.outlines import geoparquet
+    from ...read.outlines.database import import_psycopg, is_database
+    from ...read.outlines.geoparquet import is_parquet
+    from ...read.outlines.overture import is_overture
     from ...read.remote import import_fsspec, is_url
 
     if request.scheduler:
@@ -82,7 +82,7 @@ def refuse_missing_packages(request: Any) -> None:
     if is_database(request.footprints):
         import_psycopg()
     if request.terrain:
-        from ...read.raster import import_rasterio
+        from ...read.terrain.raster import import_rasterio
 
         import_rasterio()
     if is_overture(request.footprints) or is_parquet(request.footprints or ""):

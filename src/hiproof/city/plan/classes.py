@@ -14,8 +14,8 @@ import numpy as np
 
 from ...errors import InputError, InputWarning
 from ...log import count_things
-from ...read.pointcloud import iter_points
-from ...read.runs import RUN_POINTS
+from ...read.points.pointcloud import iter_points
+from ...read.points.runs import RUN_POINTS
 from ...settings import ReadSettings, Settings
 
 # looked at at once to learn the classes: one chunk of LAZ, which is decoded whole

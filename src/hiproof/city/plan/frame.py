@@ -22,9 +22,9 @@ from ...read.crs import (
     parse_crs,
     vertical_crs,
 )
-from ...read.footprints import footprint_crs
-from ...read.pointcloud import PointFileHeader, common_crs, warn_coarse
-from ...read.positions import doubtful_place, refuse_degrees, stretch
+from ...read.crs.positions import doubtful_place, refuse_degrees, stretch
+from ...read.outlines.footprints import footprint_crs
+from ...read.points.pointcloud import PointFileHeader, common_crs, warn_coarse
 
 # of a unit; files round the US survey foot, which is 2e-6 longer than the foot, to six digits or so
 SAME_UNIT = 1e-5

@@ -22,7 +22,7 @@ from .classes import choose_classes
 from .work_plan import Job
 
 if TYPE_CHECKING:
-    from ...read.pointcloud import PointFileHeader
+    from ...read.points.pointcloud import PointFileHeader
 
 MOST_BLOCK_M = 250.0
 """Distance (m) from the box of a run beyond which point files are not read for its buildings: no
@@ -96,7 +96,7 @@ def readable_points(clouds: tuple[str, ...], settings: Settings) -> PointCloud:
 
     The step that sorts points names the others.
     """
-    from ...read.pointcloud import read_points
+    from ...read.points.pointcloud import read_points
 
     try:
         return read_points(*clouds, settings=settings)
@@ -109,7 +109,7 @@ def readable_points(clouds: tuple[str, ...], settings: Settings) -> PointCloud:
 
 def is_readable(name: str) -> bool:
     """Return whether a point file can be read from end to end."""
-    from ...read.pointcloud import iter_points
+    from ...read.points.pointcloud import iter_points
 
     try:
         for _ in iter_points(name):

@@ -20,12 +20,12 @@ from pyproj import CRS
 from ...errors import InputError, OutputError, SettingsError
 from ...log import LOGGER, count_things
 from ...masking import masked_values
-from ...read.overture import TYPES, OvertureFootprints, is_overture, read_overture
+from ...read.outlines.overture import TYPES, OvertureFootprints, is_overture, read_overture
 from ...write.files import atomic
 from ..request import Request
 
 if TYPE_CHECKING:
-    from ...read.pointcloud import PointFileHeader
+    from ...read.points.pointcloud import PointFileHeader
 
 KEPT_FILE = "overture.gpkg"
 """The file in a run's own folder."""
@@ -93,7 +93,7 @@ def compute_extent(request: Request, headers: list[PointFileHeader]) -> shapely.
     Raises InputError where no file names a CRS, and for an extent across the 180th meridian.
     """
     from ...read.crs import make_transformer, names_place, parse_crs
-    from ...read.pointcloud import common_crs
+    from ...read.points.pointcloud import common_crs
     from .frame import plan_bounds
 
     read = request.settings.read

@@ -16,7 +16,7 @@ from ...errors import InputError
 from ...frames import METRES, Units
 from ...model import Footprint
 from ...read.crs import describe_crs, epsg_code, horizontal_crs, parse_crs, same_horizontal
-from ...read.positions import extent, reproject_positions
+from ...read.crs.positions import extent, reproject_positions
 
 NEIGHBOUR_SHIFTS = (1, -1, 2, -2)  # zones of one grid have consecutive codes
 FOOT_M = 0.3048  # m, by definition

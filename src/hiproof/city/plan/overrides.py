@@ -17,9 +17,9 @@ import numpy as np
 from ...errors import InputError, InputWarning
 from ...log import count_things
 from ...masking import mask
-from ...read.attribute_columns import make_known_condition, restore_declared_types
-from ...read.footprints import attribute_rows
 from ...read.numbers import SkippedValues
+from ...read.outlines.attribute_columns import make_known_condition, restore_declared_types
+from ...read.outlines.footprints import attribute_rows
 from ...settings import ReadSettings
 from ...write.files import save_text
 from .table_values import select_possible
@@ -106,7 +106,7 @@ def table_records(path: str) -> list[dict[str, Any]]:
     """
     import pyogrio
 
-    from ...read.vector_file import translate_read_errors
+    from ...read.outlines.vector_file import translate_read_errors
 
     def read(where: str | None = None) -> tuple[list[str], list[str], list[np.ndarray]]:
         meta, _, _, columns = translate_read_errors(

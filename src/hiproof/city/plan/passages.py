@@ -52,7 +52,7 @@ def add_passages(
 
 def read_passages(request: Request, frame: AreaFrame) -> list[tuple[shapely.Polygon, float]]:
     """Read the polygons of passages, with the clearance (m) of each."""
-    from ...read.footprints import read_footprints
+    from ...read.outlines.footprints import read_footprints
 
     path, column = str(request.underpasses), request.settings.read.clearance_column
     with warnings.catch_warnings():

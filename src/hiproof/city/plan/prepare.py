@@ -13,7 +13,7 @@ from ...errors import InputError, InputWarning
 from ...frames import Units
 from ...masking import mask
 from ...model import Footprint
-from ...read.positions import format_box
+from ...read.crs.positions import format_box
 from ...settings import Settings
 from ...write.naming import FileUnits
 from ...write.reprojected import choose_file_crs
@@ -39,8 +39,8 @@ from .work_plan import (
 
 if TYPE_CHECKING:
     from ...fit.registration import Registration
-    from ...read.operations import Operation
-    from ...read.raster import RasterTerrain
+    from ...read.crs.operations import Operation
+    from ...read.terrain.raster import RasterTerrain
     from .frame import AreaFrame
 
 TILE_M = 250.0  # m, side of a work tile: some dozens of houses, so that a core has minutes to do
@@ -106,7 +106,7 @@ def warn_files_elsewhere(jobs: tuple[Job, ...], crs: Any, units: FileUnits) -> N
 
     That is another place than that of the buildings.
     """
-    from ...read.positions import doubtful_place
+    from ...read.crs.positions import doubtful_place
 
     boxes = shapely.bounds([job.area for job in jobs])
     corners = units.gml.from_metres(boxes[np.isfinite(boxes).all(axis=1)].reshape(-1, 2))
@@ -168,7 +168,7 @@ def read_headers(clouds: tuple[str, ...]) -> list:
 
     A file that cannot be read does not end the run.
     """
-    from ...read.pointcloud import as_input_error, format_others, read_header
+    from ...read.points.pointcloud import as_input_error, format_others, read_header
 
     headers, errors = [], []
     for name in clouds:
@@ -257,7 +257,7 @@ def all_footprints(request: Request, frame: AreaFrame, headers: list) -> tuple[F
 
     What is odd about them has been said of those that are asked for.
     """
-    from ...read.database import is_database
+    from ...read.outlines.database import is_database
     from .frame import plan_bounds
 
     bounds, path = plan_bounds(headers), str(request.footprints)
@@ -276,7 +276,7 @@ def all_footprints(request: Request, frame: AreaFrame, headers: list) -> tuple[F
 def read_requested_footprints(
     request: Request, frame: AreaFrame, where: str | None, bbox: Box | None
 ) -> tuple[Footprint, ...]:
-    from ...read.footprints import read_footprints
+    from ...read.outlines.footprints import read_footprints
 
     return read_footprints(
         str(request.footprints),
@@ -302,8 +302,8 @@ def list_operations(
     There is none where both are the same or one is unknown. A warning says where it is coarse.
     """
     from ...read.crs import horizontal_crs, names_place, same_horizontal
-    from ...read.operations import find_operation, warn_if_coarse
-    from ...read.positions import reproject_positions
+    from ...read.crs.operations import find_operation, warn_if_coarse
+    from ...read.crs.positions import reproject_positions
 
     boxes = shapely.bounds([job.area for job in jobs])
     boxes = boxes[np.isfinite(boxes).all(axis=1)]
@@ -346,7 +346,7 @@ def jobs_in_box(jobs: tuple[Job, ...], request: Request, units: Units) -> tuple[
 
     Raises InputError where none does.
     """
-    from ...read.footprints import meets
+    from ...read.outlines.footprints import meets
 
     if request.bbox is None:
         return jobs

@@ -29,9 +29,9 @@ from ...frames import Units
 from ...geometry.grid import number_cells
 from ...masking import mask
 from ...model import Footprint, PointCloud
-from ...read.las import is_copc
-from ...read.lax import read_lax
-from ...read.pointcloud import PointFileHeader, file_kind, iter_points
+from ...read.points.las import is_copc
+from ...read.points.lax import read_lax
+from ...read.points.pointcloud import PointFileHeader, file_kind, iter_points
 from ...settings import Settings
 
 SAMPLE_CELL_M = 250.0

@@ -21,7 +21,7 @@ from ...fit.registration import Registration
 from ...frames import Units
 from ...model import Footprint
 from ...read.crs import parse_crs
-from ...read.operations import Operation
+from ...read.crs.operations import Operation
 from ...settings import Settings
 from ...stages.outline import without_needless_vertices
 from ...write.cityjson.features import choose_offset

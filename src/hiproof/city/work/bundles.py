@@ -38,7 +38,7 @@ from ...log import LOGGER
 from ...masking import mask, masked_values
 from ...model import Footprint
 from ...parametric.override import NOTE_KEYS, Override, read_override
-from ...read.las import translate_errors
+from ...read.points.las import translate_errors
 from ...settings import Settings
 from ..plan.overrides import OVERRIDES_FILE
 from ..plan.work_plan import Job, WorkPlan, neighbourhood

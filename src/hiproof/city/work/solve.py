@@ -29,8 +29,8 @@ from ...method import reconstruct
 from ...model import Building
 from ...parametric.fallback import list_fallback_columns, use_fallback
 from ...parametric.override import Override, overridden
-from ...read.raster import RasterTerrain
 from ...read.terrain import Terrain, TerrainChain, read_terrain
+from ...read.terrain.raster import RasterTerrain
 from ...settings import Settings
 from ...stages.footprint import shift_remark
 from ...stages.outline import largest_polygon

@@ -26,10 +26,10 @@ from ...errors import OutputError, is_interrupt
 from ...frames import Units
 from ...geometry.point_grid import PointGrid
 from ...model import PointCloud
-from ...read.las import is_copc
-from ...read.lax import read_lax
-from ...read.pointcloud import as_input_error, file_kind, iter_points, read_header
-from ...read.runs import RunIndex, make_index
+from ...read.points.las import is_copc
+from ...read.points.lax import read_lax
+from ...read.points.pointcloud import as_input_error, file_kind, iter_points, read_header
+from ...read.points.runs import RunIndex, make_index
 from ...settings import ReadSettings
 from ...write.files import atomic_file
 from ..plan.overrides import REDO, load_redo
@@ -265,7 +265,7 @@ def wanted_points(
 
     They are all of its chunks; unless it `is_whole`, of a file with a spatial index, or with the
     places of its points in the file `noted`, only what holds buildings' surroundings. Where it is
-    read from end to end, `result` gets these places (noted.py).
+    read from end to end, `result` gets these places (`save_run_boxes`).
     """
     if file_kind(path) != "las":
         return iter_points(path, units=units)

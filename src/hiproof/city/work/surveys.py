@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ...read.raster import RasterTerrain
+from ...read.terrain.raster import RasterTerrain
 from ..plan.work_plan import WorkPlan
 from .solve import Surroundings
 from .sort import POINT_KINDS, load_points

@@ -1,7 +1,7 @@
 """Triangles for viewers and pages.
 
 viewed       a building as viewers draw it
-triangles    faces cut into triangles
+triangles    faces cut into triangles, also packed for a page's JavaScript
 glb, gltf    binary glTF 2.0, its container and its content
 obj          Wavefront OBJ
 stl          binary STL
@@ -9,5 +9,4 @@ ifc          IFC4X3
 dxf          DXF, for CAD
 rhino        3DM, for Rhino
 tiles        3D Tiles 1.1
-page_mesh    a solid packed for a page's JavaScript
 """

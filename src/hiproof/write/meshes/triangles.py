@@ -1,4 +1,4 @@
-"""Planar faces cut into triangles, for formats that hold nothing else."""
+"""Planar faces cut into triangles, for formats that hold nothing else, and for pages."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ import json
 import os
 from typing import Any
 
-from ...read.geoparquet import import_pyarrow
+from ...read.outlines.geoparquet import import_pyarrow
 from ..head import FileHead
 from .geopackage import BUILDINGS, AttributesWriter
 from .rows import Row

@@ -24,9 +24,9 @@ import numpy as np
 from ...errors import InputError, OutputError
 from ...frames import Units
 from ...model import Solid
-from ...read.attribute_columns import quote
-from ...read.damage import Damaged, refuse
-from ...read.database import TIMEOUT_S, import_psycopg, refuse_half_a_password
+from ...read.models.damage import Damaged, refuse
+from ...read.outlines.attribute_columns import quote
+from ...read.outlines.database import TIMEOUT_S, import_psycopg, refuse_half_a_password
 from ..attribute_list import PREFIX
 from ..described import Described
 from ..meshes.triangles import faces_triangles

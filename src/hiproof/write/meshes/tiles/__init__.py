@@ -3,8 +3,7 @@
 Each tile is one draw call, with the buildings' attributes.
 
 `globe` says where coordinates lie on the Earth, `quadtree` which building is drawn in which tile,
-`meshes` how one looks, `properties` what is told of it, `content` makes a tile's file of these,
-`tileset` the whole.
+`properties` what is told of it, `content` how it looks and a tile's file, `tileset` the whole.
 """
 
 from .globe import Globe

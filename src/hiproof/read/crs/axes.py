@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from ..errors import InputError
+from ...errors import InputError
 
 LEAST_UNIT_M, MOST_UNIT_M = 1e-3, 2000.0
 """Shortest and longest unit (m) of a coordinate: EPSG's own linear units run from 0.001 m to 1,852

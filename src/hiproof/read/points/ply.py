@@ -13,10 +13,10 @@ from typing import BinaryIO
 
 import numpy as np
 
-from ..errors import InputError
-from ..log import count_things
+from ...errors import InputError
+from ...log import count_things
+from ..remote import open_binary
 from .las import Chunk
-from .remote import open_binary
 from .text import TextLayout, find_columns, parse_rows, read_classes
 
 PLY_TYPES = {

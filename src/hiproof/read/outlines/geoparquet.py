@@ -24,11 +24,11 @@ import shapely
 from pyogrio.errors import FeatureError
 from pyproj import CRS
 
-from ..errors import InputError
-from ..extras import import_extra
+from ...errors import InputError
+from ...extras import import_extra
+from ..crs import read_named_crs
+from ..remote import is_url, open_binary
 from .attribute_columns import shortest
-from .crs import read_named_crs
-from .remote import is_url, open_binary
 from .wkb import decode_geometries
 
 ROW, FID = "hiproof_row", "hiproof_fid"

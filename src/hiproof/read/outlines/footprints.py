@@ -14,14 +14,14 @@ import numpy as np
 import shapely
 from pyproj import CRS
 
-from ..errors import InputError, InputWarning
-from ..frames import Units
-from ..geometry.rings import clockwise
-from ..log import count_things
-from ..masking import remember
-from ..model import Footprint
-from ..settings import Settings
-from .crs import (
+from ...errors import InputError, InputWarning
+from ...frames import Units
+from ...geometry.rings import clockwise
+from ...log import count_things
+from ...masking import remember
+from ...model import Footprint
+from ...settings import Settings
+from ..crs import (
     describe_crs,
     find_units,
     make_transformer,
@@ -31,12 +31,12 @@ from .crs import (
     read_named_crs,
     same_horizontal,
 )
+from ..crs.operations import find_operation, warn_if_coarse
+from ..crs.positions import format_box, refuse_degrees
+from ..remote import is_url
 from .database import is_database, read_table, table_crs
 from .geoparquet import is_parquet
-from .operations import find_operation, warn_if_coarse
 from .polygons import is_surface, simple_polygons
-from .positions import format_box, refuse_degrees
-from .remote import is_url
 
 if TYPE_CHECKING:
     from .vector_file import Features

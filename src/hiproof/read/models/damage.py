@@ -13,8 +13,8 @@ import re
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, TypeVar
 
-from ..errors import InputError
-from ..log import LOGGER, count_things
+from ...errors import InputError
+from ...log import LOGGER, count_things
 
 T = TypeVar("T")
 Damaged = Callable[[InputError], None]

@@ -13,11 +13,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import InputError
-from ..frames import METRES, Units
-from .crs import find_named_units, refuse_other_crs
+from ...errors import InputError
+from ...frames import METRES, Units
+from ..crs import find_named_units, refuse_other_crs
+from ..plausible import is_plausible
 from .damage import Damaged, excerpt, readable, refuse
-from .plausible import is_plausible
 from .shells import read_vertices
 
 UNUSABLE = (KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError)

@@ -13,7 +13,7 @@ from typing import Any
 from pyproj import CRS
 from pyproj.exceptions import CRSError
 
-from .crs import UnknownCRS, combine, explain_crs_error, names_heights_alone, vertical_crs
+from ..crs import UnknownCRS, combine, explain_crs_error, names_heights_alone, vertical_crs
 
 DIRECTORY, DOUBLES, TEXTS = 34735, 34736, 34737
 """Records that hold the keys: the directory, and where it points to for decimals and for texts."""

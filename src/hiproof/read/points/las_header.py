@@ -18,7 +18,7 @@ from typing import BinaryIO, NamedTuple
 import lazrs
 import numpy as np
 
-from .plausible import MOST_HEIGHT, MOST_PLAN, Implausible, compute_bounds
+from ..plausible import MOST_HEIGHT, MOST_PLAN, Implausible, compute_bounds
 
 HEADER_BYTES = {0: 227, 1: 227, 2: 227, 3: 235, 4: 375, 5: 393}  # by minor version
 RECORD_BYTES = (20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67)  # by point format, without extra bytes

@@ -23,7 +23,8 @@ from urllib.parse import urljoin, urlsplit
 import numpy as np
 import shapely
 
-from ..errors import InputError
+from ...errors import InputError
+from ..remote import choose_options
 from .geoparquet import (
     geometries_in,
     geometry_column,
@@ -32,7 +33,6 @@ from .geoparquet import (
     open_parquet,
     read_rows,
 )
-from .remote import choose_options
 
 TRIES = 3  # of a document: of hundreds of requests a server closes one now and then
 PAUSE_S = 0.5  # s between two of them

@@ -13,7 +13,7 @@ import warnings
 from collections.abc import Iterator
 from typing import Any
 
-from ..errors import InputError, InputWarning
+from ...errors import InputError, InputWarning
 
 UNIT_NAMES = {
     "m metre meter metres meters": 1.0,

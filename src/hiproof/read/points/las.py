@@ -21,11 +21,11 @@ import lazrs
 import numpy as np
 from laspy import DecompressionSelection, LazBackend
 
-from ..errors import InputError, InputWarning
-from ..log import count_things
+from ...errors import InputError, InputWarning
+from ...log import count_things
+from ..plausible import Implausible
+from ..remote import is_url, open_binary
 from .las_header import LasFacts, Octree, check_all_points, check_points, read_facts
-from .plausible import Implausible
-from .remote import is_url, open_binary
 from .runs import compute_run_boxes
 
 Box = tuple[float, float, float, float]

@@ -17,12 +17,12 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
-from ..frames import METRES, Units
-from ..log import count_things
-from ..model import WALL, Face, Solid
+from ...errors import InputError
+from ...frames import METRES, Units
+from ...log import count_things
+from ...model import WALL, Face, Solid
+from ..crs import find_named_units, refuse_other_crs
 from .cityjson import UNUSABLE, Feature, features, unusable
-from .crs import find_named_units, refuse_other_crs
 from .damage import Damaged, refuse
 from .shells import read_geometries, read_shell, require_list
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from ..geometry.rings import repair_polygons
-from .plausible import is_plausible
+from ...geometry.rings import repair_polygons
+from ..plausible import is_plausible
 
 # of a repaired footprint's area; smaller fragments are artefacts of the self-intersection
 SLIVER_SHARE = 0.01

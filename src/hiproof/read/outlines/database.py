@@ -20,9 +20,9 @@ from urllib.parse import parse_qs, urlencode, urlsplit, urlunsplit
 import numpy as np
 import shapely
 
-from ..errors import InputError
-from ..extras import import_extra
-from ..masking import mask, remember
+from ...errors import InputError
+from ...extras import import_extra
+from ...masking import mask, remember
 from .wkb import as_polygons, decode_geometry
 
 TIMEOUT_S = 10  # to reach a server; libpq would wait for minutes

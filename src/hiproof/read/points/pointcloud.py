@@ -15,13 +15,12 @@ from urllib.parse import urlsplit
 
 import numpy as np
 
-from ..errors import InputError, InputWarning
-from ..frames import METRES, Units
-from ..log import count_things
-from ..model import PointCloud
-from ..settings import Settings
-from . import las, ply, text
-from .crs import (
+from ...errors import InputError, InputWarning
+from ...frames import METRES, Units
+from ...log import count_things
+from ...model import PointCloud
+from ...settings import Settings
+from ..crs import (
     UnknownCRS,
     describe_crs,
     find_units,
@@ -31,9 +30,10 @@ from .crs import (
     same_horizontal,
     vertical_crs,
 )
+from ..plausible import MOST_HEIGHT, MOST_PLAN, compute_bounds, is_plausible
+from ..remote import is_url
+from . import las, ply, text
 from .las_crs import las_crs
-from .plausible import MOST_HEIGHT, MOST_PLAN, compute_bounds, is_plausible
-from .remote import is_url
 from .runs import RUN_POINTS
 
 

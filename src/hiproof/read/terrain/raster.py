@@ -16,12 +16,12 @@ from typing import Any
 import numpy as np
 from pyproj import CRS
 
-from ..errors import DamagedRaster, InputError, InputWarning
-from ..extras import import_extra
-from ..frames import Units
-from ..geometry.grid import number_cells
-from ..masking import mask, remember
-from .crs import (
+from ...errors import DamagedRaster, InputError, InputWarning
+from ...extras import import_extra
+from ...frames import Units
+from ...geometry.grid import number_cells
+from ...masking import mask, remember
+from ..crs import (
     find_units,
     horizontal_crs,
     make_transformer,
@@ -30,14 +30,8 @@ from .crs import (
     same_horizontal,
     vertical_crs,
 )
-from .plausible import HIGHEST_LAND_M, LOWEST_LAND_M
-from .raster_checks import (
-    alpha_band,
-    band_unit,
-    height_band,
-    read_scaling,
-    refuse_without_position,
-)
+from ..plausible import HIGHEST_LAND_M, LOWEST_LAND_M
+from .raster_checks import alpha_band, band_unit, height_band, read_scaling, refuse_without_position
 
 TILE_PX = 512
 """Side (pixels) of what is read at once. GeoTIFFs are often stored in such tiles."""

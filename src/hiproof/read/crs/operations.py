@@ -20,8 +20,8 @@ from pyproj import CRS, Transformer
 from pyproj.exceptions import ProjError
 from pyproj.transformer import AreaOfInterest, TransformerGroup
 
-from ..errors import InputWarning
-from .crs import describe_crs, parse_crs
+from ...errors import InputWarning
+from . import describe_crs, parse_crs
 
 COARSE_OPERATION_M = 1.0
 """Accuracy (m) from which on an operation is worth a remark: footprints a metre off take their

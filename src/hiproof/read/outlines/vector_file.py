@@ -18,7 +18,7 @@ import pyogrio
 from pyogrio.errors import DataLayerError, DataSourceError, FeatureError, FieldError, GeometryError
 from pyogrio.util import vsi_path
 
-from ..errors import InputError, InputWarning
+from ...errors import InputError, InputWarning
 from .attribute_columns import make_known_condition, restore_declared_types
 from .wkb import decode_geometries
 

@@ -18,9 +18,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import InputWarning
+from ...errors import InputWarning
+from ..remote import is_url
 from .las import read_checked_facts
-from .remote import is_url
 from .runs import RunIndex
 
 

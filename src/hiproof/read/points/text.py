@@ -14,10 +14,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import InputError
-from ..log import count_things
+from ...errors import InputError
+from ...log import count_things
+from ..remote import open_binary
 from .las import Chunk
-from .remote import open_binary
 
 COMMENTS = ("#", "//")
 

@@ -9,8 +9,8 @@ import numpy as np
 from pyproj import CRS, Proj, Transformer
 from pyproj.exceptions import ProjError
 
-from ..errors import InputError
-from .crs import (
+from ...errors import InputError
+from . import (
     convert_to_degrees,
     describe_crs,
     horizontal_crs,

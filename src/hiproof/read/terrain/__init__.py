@@ -12,8 +12,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ..errors import InputError
-from ..frames import Units
+from ...errors import InputError
+from ...frames import Units
 from .raster import RasterTerrain, import_rasterio
 
 

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..model import GROUND, ROOF, WALL
+from ...model import GROUND, ROOF, WALL
 from .damage import excerpt
 
 Rings = tuple[tuple[int, ...], ...]

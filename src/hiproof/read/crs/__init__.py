@@ -11,8 +11,8 @@ import numpy as np
 from pyproj import CRS, Proj, Transformer
 from pyproj.exceptions import CRSError, ProjError
 
-from ..errors import InputError, InputWarning
-from ..frames import METRES, Units
+from ...errors import InputError, InputWarning
+from ...frames import METRES, Units
 from .axes import check_height_axis, check_plan_axes
 
 WGS84 = CRS.from_epsg(4326)

@@ -1,0 +1,1 @@
+"""Models of CityJSON and CityGML files, as they stand."""

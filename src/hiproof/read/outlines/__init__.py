@@ -1,0 +1,1 @@
+"""Building footprints from vector files, GeoParquet, PostGIS and Overture Maps."""

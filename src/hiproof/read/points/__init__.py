@@ -1,0 +1,1 @@
+"""Point clouds from LAS, LAZ, COPC, text and PLY files, in chunks."""
