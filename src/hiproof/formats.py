@@ -131,12 +131,9 @@ def choose_format(file: str) -> str | None:
     >>> [choose_format(name) for name in ("a.gml", "a.citygml3.gml", "b.json", "c.jsonl", "d.txt")]
     ['citygml2', 'citygml3', 'cityjson', 'cityjsonseq', None]
     """
-    endings = {file_ending(format): name for name, format in reversed(CONVERTED.items())}
+    endings = {
+        format.file[format.file.index(".") :]: name for name, format in reversed(CONVERTED.items())
+    }
     suffixes = {Path(format.file).suffix: name for name, format in reversed(CONVERTED.items())}
     candidates = [ending for ending in (endings | suffixes) if file.lower().endswith(ending)]
     return (suffixes | endings)[max(candidates, key=len)] if candidates else None
-
-
-def file_ending(format: Format) -> str:
-    """Return all that follows the first word of its file's name."""
-    return format.file[format.file.index(".") :]

@@ -127,7 +127,12 @@ def primitive_svg(kind: str) -> str:
     centre, _ = bound_sphere(building.solid)
     lines = measures(kind)
     page = {
-        id(m): [on_page(point - centre) for point in (m.start, m.end) if point is not None]
+        id(m): [
+            FIGURE_SCALE
+            * project_points((point - centre)[None], FIGURE_TURN_DEG, FIGURE_TILT_DEG)[0, :2]
+            for point in (m.start, m.end)
+            if point is not None
+        ]
         for m in lines
     }
     corners = (
@@ -150,10 +155,6 @@ def primitive_svg(kind: str) -> str:
         "</svg>",
     ]
     return "\n".join(text) + "\n"
-
-
-def on_page(point: np.ndarray) -> np.ndarray:
-    return FIGURE_SCALE * project_points(point[None], FIGURE_TURN_DEG, FIGURE_TILT_DEG)[0, :2]
 
 
 def face_path(face: SeenFace) -> str:

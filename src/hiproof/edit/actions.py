@@ -49,15 +49,15 @@ def apply_edit(
     if action not in ACTIONS:
         raise InputError(f"expected an edit ({', '.join(ACTIONS)}), got {action!r:.40}; choose one")
     parts = ACTIONS[action](record, list_at(record, "parts"), requested, points)
-    result = build(by_hand(record) | {"parts": parts}, settings.compose)
+    result = build(
+        {**record, "status": Status.MODELLED.code, "quality": None, "detail": BY_HAND}
+        | {"parts": parts},
+        settings.compose,
+    )
     result = dataclasses.replace(result, quality=Quality())  # no figure of the earlier model stays
     result = refit_parts_freely(result) if action == "refit" else result
     local = result.roof.frame.to_local(points)
     return measure_building(result, local) if is_measured and len(local) else result
-
-
-def by_hand(record: Record) -> dict[str, Any]:
-    return {**record, "status": Status.MODELLED.code, "quality": None, "detail": BY_HAND}
 
 
 def show_parts(record: Record, parts: list, requested: Record, points: np.ndarray) -> list:

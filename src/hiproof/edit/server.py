@@ -47,7 +47,13 @@ class Service:
     def __init__(self, desk: Desk, token: str | None = None) -> None:
         self.desk, self.token, self.port = desk, token or secrets.token_urlsafe(24), 0
         self.read: dict[str, Callable[[Mapping[str, str]], Any]] = {
-            "start": lambda q: describe_start(desk),
+            "start": lambda q: {
+                "folder": str(desk.run.folder),
+                "who": desk.who,
+                "types": list(CATALOGUE),
+                "colours": page_colours(),
+                "missing": desk.points.missing,
+            },
             "buildings": lambda q: desk.buildings(q.get("find", "")),
             "building": lambda q: desk.building(q.get("id", "")),
             "points": lambda q: desk.cloud(q.get("id", "")),
@@ -130,17 +136,6 @@ class Service:
         if not isinstance(requested, dict) or not isinstance(requested.get("id"), str):
             raise InputError("expected an object with the id of a building, got something else")
         return as_json(self.write[name](requested["id"], requested))
-
-
-def describe_start(desk: Desk) -> dict[str, Any]:
-    """Return what the page needs at the start."""
-    return {
-        "folder": str(desk.run.folder),
-        "who": desk.who,
-        "types": list(CATALOGUE),
-        "colours": page_colours(),
-        "missing": desk.points.missing,
-    }
 
 
 def as_json(value: Any, code: int = 200) -> Answer:

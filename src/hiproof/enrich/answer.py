@@ -155,7 +155,11 @@ def answer(
     contacts = town.list_contacts(number)
     regions = group_regions(town, contacts)
     solid, party = cut_walls(building.solid, town.list_walls(number), regions)
-    areas = measure_areas(building.solid, measure_party(regions))
+    # places that two neighbours touch count once
+    party_m2 = sum(
+        shapely.union_all([region for _, region in of_face]).area for of_face in regions.values()
+    )
+    areas = measure_areas(building.solid, float(party_m2))
     attributes = {
         **{OWN + name: round_value(area, 4) for name, area in areas.items()},
         **{name: round_value(areas[own], 4) for own, name in OF_3DBAG.items()},
@@ -167,7 +171,11 @@ def answer(
     if cadastre is not None:
         sun, faces = cadastre.describe(number, solid, party)
         attributes, surfaces = attributes | sun, surfaces | faces
-    return Answers(with_solid(building, solid), attributes, surfaces)
+    return Answers(
+        dataclasses.replace(building, built=dataclasses.replace(building.model, solid=solid)),
+        attributes,
+        surfaces,
+    )
 
 
 def describe_house(town: Town, number: int, areas: dict[str, float], use: Any) -> dict[str, Any]:
@@ -210,19 +218,6 @@ def group_regions(town: Town, contacts: dict[int, tuple[Contact, ...]]) -> dict[
     return regions
 
 
-def measure_party(regions: dict[int, list[Region]]) -> float:
-    """Return the area (m2) of all party walls.
-
-    Places that two neighbours touch count once.
-    """
-    return float(
-        sum(
-            shapely.union_all([region for _, region in of_face]).area
-            for of_face in regions.values()
-        )
-    )
-
-
 def describe_party(town: Town, contacts: dict[int, tuple[Contact, ...]]) -> str:
     """Return the area (m2) of the party wall with each neighbour by id, as JSON."""
     areas = {
@@ -230,8 +225,3 @@ def describe_party(town: Town, contacts: dict[int, tuple[Contact, ...]]) -> str:
         for other in contacts
     }
     return json.dumps(areas, ensure_ascii=False)
-
-
-def with_solid(building: Building, solid: Solid) -> Building:
-    """Return a building with another solid of the same shape."""
-    return dataclasses.replace(building, built=dataclasses.replace(building.model, solid=solid))

@@ -110,11 +110,6 @@ def measure_panels(
     return float(shapely.intersection(grown, inner).area)
 
 
-def estimate_yield(area_m2: float, sun_kwh_m2: float) -> float:
-    """Return the yield (kWh) of panels in a year."""
-    return area_m2 * sun_kwh_m2 * PANEL_EFFICIENCY * PERFORMANCE_RATIO
-
-
 def locate(head: FileHead, x: float, y: float) -> tuple[float, float, float]:
     """Return longitude, latitude and true north at a place, in degrees.
 
@@ -218,7 +213,7 @@ class Cadastre:
         for face, sun in suns.items():
             year = float(sun.by_month.sum())
             panels = measure_panels(solid, face, normals[face], objects)
-            power = estimate_yield(panels, year)
+            power = panels * year * PANEL_EFFICIENCY * PERFORMANCE_RATIO
             totals += (size[face] * year, panels, power)
             surfaces[face] = round_values(
                 {**name_values(sun), "pv_area_m2": panels, "pv_kwh": power}, 3

@@ -170,7 +170,11 @@ def enrich_run(
     refuse_unusable(settings)
     parameters = run / FORMATS["parameters"].file if run.is_dir() else run
     out = out or parameters.parent / FOLDER
-    refuse_own_folder(out)
+    if (out / FORMATS["parameters"].file).exists():
+        raise OutputError(
+            f"expected a folder for enriched files, got {out}, which holds a run; choose another "
+            "--out"
+        )
     waiting = make_waiting_folder(out, parameters, settings)
     index = index_records(parameters)
     if len(index.offsets):
@@ -202,15 +206,6 @@ def enrich_run(
     write_record(parameters.parent, out, settings, result)
     shutil.rmtree(waiting.parent, ignore_errors=True)
     return result
-
-
-def refuse_own_folder(out: Path) -> None:
-    """Raise OutputError for a folder that holds a run's own files."""
-    if (out / FORMATS["parameters"].file).exists():
-        raise OutputError(
-            f"expected a folder for enriched files, got {out}, which holds a run; choose another "
-            "--out"
-        )
 
 
 def make_waiting_folder(out: Path, parameters: Path, settings: EnrichSettings) -> Path:

@@ -182,18 +182,12 @@ def refuse_other_kinds(record: dict[str, Any]) -> None:
             value = value.get(name) if value is not None else None
         is_odd = isinstance(value, bool) or (isinstance(value, float) and not math.isfinite(value))
         if value is not None and (is_odd or not isinstance(value, kind)):
-            raise InputError(
-                f"expected {name_kind(kind)} as {'.'.join(names)}, got {excerpt(value)}"
-            )
+            text = {dict: "an object", list: "a list", NUMBER: "a finite number"}.get(kind, "text")
+            raise InputError(f"expected {text} as {'.'.join(names)}, got {excerpt(value)}")
     refuse_other_surveys(record)
     bbox = (record.get("inputs") or {}).get("bbox")
     if bbox and (len(bbox) != 4 or not all(type(side) in NUMBER for side in bbox)):
         raise InputError(f"expected four numbers as inputs.bbox, got {excerpt(bbox)}")
-
-
-def name_kind(kind: Any) -> str:
-    """Name a kind of JSON value."""
-    return {dict: "an object", list: "a list", NUMBER: "a finite number"}.get(kind, "text")
 
 
 def run_settings(record: dict[str, Any]) -> Settings:

@@ -317,7 +317,12 @@ class Trainer:
         """Export the best epoch and write the model card."""
         self.averaged.load_state_dict(self.best["weights"])
         path = export(self.averaged.cpu(), self.folder / "roof_types.onnx")
-        made_by = {"device": device_name(self.device), "hours": round(self.seconds / 3600, 2)}
+        made_by = {
+            "device": torch.cuda.get_device_name(self.device)
+            if self.device.type == "cuda"
+            else "CPU",
+            "hours": round(self.seconds / 3600, 2),
+        }
         write_card(
             self.folder,
             self.source.description,
@@ -369,10 +374,6 @@ def chosen_device(name: str) -> torch.device:
     if name not in ("auto", "cpu", "cuda"):
         raise SettingsError(f"expected the device to be one of auto, cpu, cuda, got {name!r}")
     return torch.device("cuda" if name == "cuda" or (name == "auto" and available) else "cpu")
-
-
-def device_name(device: torch.device) -> str:
-    return torch.cuda.get_device_name(device) if device.type == "cuda" else "CPU"
 
 
 def writable_folder(out: str | Path) -> Path:

@@ -79,7 +79,11 @@ def merged_parts(item: dict[str, Any], other: dict[str, Any]) -> dict[str, Any]:
     It has the type, direction and heights of the larger one, over the rectangle around both, and
     roofs what both roofed.
     """
-    main, side = sorted(map(with_sizes, (item, other)), key=compute_part_area, reverse=True)
+    main, side = sorted(
+        map(with_sizes, (item, other)),
+        key=lambda part: sum(make_polygon(outline).area for outline in part["outlines"]),
+        reverse=True,
+    )
     along, across = find_axis(main, "length"), find_axis(main, "width")
     corners = np.concatenate([compute_corners(main), compute_corners(side)])
     lower, upper = (np.array([f(corners @ along), f(corners @ across)]) for f in (np.min, np.max))
@@ -160,10 +164,6 @@ def compute_corners(part: dict[str, Any]) -> np.ndarray:
     u = 0.5 * part["parameters"]["length"] * find_axis(part, "length")
     v = 0.5 * part["parameters"]["width"] * find_axis(part, "width")
     return np.array(part["position"][:2]) + np.array([-u - v, u - v, u + v, v - u])
-
-
-def compute_part_area(part: dict[str, Any]) -> float:
-    return sum(make_polygon(outline).area for outline in part["outlines"])
 
 
 def cut_outlines(outlines: list[Any], place: np.ndarray, direction: np.ndarray) -> list[Any]:

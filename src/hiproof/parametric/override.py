@@ -37,7 +37,7 @@ from ..stages.footprint import align_footprint, start_building
 from ..stages.ground import Ground, find_ground, query_terrain
 from ..stages.outline import to_local
 from ..stages.points import usable
-from ..stages.remarks import add_remark, without_doubt
+from ..stages.remarks import add_remark
 from ..stages.solid import add_installations, add_overhangs, open_passages, reach_terrain
 from ..status import Doubt, Status
 from ..write.attribute_list import TABLES
@@ -449,7 +449,11 @@ def fit_within(
             "ground_source": "override",
         }
         repeat = rebuild(building, record)
-        detail = without_doubt(building.detail, Doubt.GROUND_ABOVE_EAVES)
+        detail = "; ".join(  # but for the remark of a doubt that no longer holds
+            remark
+            for remark in building.detail.split("; ")
+            if Doubt.GROUND_ABOVE_EAVES.value not in remark
+        )
         repeat = dataclasses.replace(repeat, quality=building.quality, grade=building.grade)
         building = dataclasses.replace(repeat, status=building.status, detail=detail)
     return building

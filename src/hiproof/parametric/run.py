@@ -97,7 +97,11 @@ def build_file(
     cannot be written; then nothing is written.
     """
     path, out, built = Path(path), Path(out), Built()
-    refuse_run_folder(out)
+    if (out / ".hiproof").exists():  # that command would make all its files again
+        raise OutputError(
+            f"expected a folder for what is built, got {out}, which holds a run of `hiproof "
+            "reconstruct`; choose another --out"
+        )
     refuse_overwriting([out / FORMATS["parameters"].file], [path])
     with opened_parameters(path) as (head, records):
         settings = Settings(write=head.write).replace(changes or {})
@@ -114,19 +118,6 @@ def build_file(
         )
     write_record(path, out, maker.head, built)
     return built
-
-
-def refuse_run_folder(out: Path) -> None:
-    """Raise OutputError for a folder of `hiproof reconstruct`.
-
-    That command would make all its files again.
-    """
-    if (out / ".hiproof").exists():
-        raise OutputError(
-            f"expected a folder for what is built, got {out}, which holds a run of `hiproof "
-            "reconstruct`; "
-            "choose another --out"
-        )
 
 
 def make_fragments(

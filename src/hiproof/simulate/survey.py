@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import OutputError
-from .flight import Beams, Swath, join_beams, make_beams
+from .flight import Swath, join_beams, make_beams
 from .relief import Relief
 from .roofs import turn_points
 from .scanner import Scan, ScanSettings, returns, with_outliers
@@ -134,21 +134,13 @@ def surveyed_patch(
     beams = join_beams([make_beams(rng, swath, np.zeros(2), reach + 8.0, 4.0) for swath in swaths])
     cloud = returns(
         town_scene(lots, terrain, centre),
-        select_beams(beams, upper - xy_centre + 12.0),
+        beams.select((np.abs(beams.xy0) < (upper - xy_centre + 12.0)).all(axis=1)),
         rng,
         settings,
     )
     cloud = with_outliers(rng, cloud, OUTLIER_SHARE).move(centre)
     inside = np.all((cloud.points[:, :2] >= lower) & (cloud.points[:, :2] < upper), axis=1)
     return cloud.select(inside)
-
-
-def select_beams(beams: Beams, half_size: np.ndarray) -> Beams:
-    """Select beams that meet the ground within a rectangle about the origin.
-
-    It has `half_size` (2,).
-    """
-    return beams.select((np.abs(beams.xy0) < half_size).all(axis=1))
 
 
 def assign_classes(cloud: Scan) -> np.ndarray:

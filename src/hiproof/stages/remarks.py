@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 from ..model import Building
-from ..status import Doubt, Grade
+from ..status import Grade
 
 
 def add_remark(building: Building, *remarks: str) -> Building:
@@ -20,8 +20,3 @@ def add_finding(building: Building, finding: str) -> Building:
     """Add a remark that speaks against a model, which then is fair at best."""
     grade = Grade.FAIR if building.grade is Grade.GOOD else building.grade
     return add_remark(dataclasses.replace(building, grade=grade), finding)
-
-
-def without_doubt(detail: str, doubt: Doubt) -> str:
-    """Remove the remark of a doubt that no longer holds from a detail."""
-    return "; ".join(remark for remark in detail.split("; ") if doubt.value not in remark)

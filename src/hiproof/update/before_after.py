@@ -25,21 +25,6 @@ MOST_CHANGE_POINTS = 2000
 """Points of a survey drawn of a building: at 10 points/m2 all of a house, 32 kB in the page."""
 
 
-def make_scenes(
-    run: EvaluatedRun, earlier: EvaluatedRun, pairs: list[tuple[int, int]]
-) -> list[dict[str, Any]]:
-    """Return the scene of each changed building.
-
-    `pairs` are the numbers of its models in the update and in the `earlier` run.
-    """
-    return [
-        make_scene(
-            (earlier.models[before], earlier.points[before]), (run.models[after], run.points[after])
-        )
-        for after, before in pairs
-    ]
-
-
 def make_scene(
     before: tuple[BuildingModel, np.ndarray], after: tuple[BuildingModel, np.ndarray]
 ) -> dict[str, Any]:
@@ -117,7 +102,13 @@ def draw_changes(
         for number, (after, before) in enumerate(pairs)
     ]
     section = read_asset("changes.html").replace("<!--options-->", "".join(options))
-    return section.replace("<!--cards-->", "".join(cards)), make_scenes(run, earlier, pairs)
+    scenes = [
+        make_scene(
+            (earlier.models[before], earlier.points[before]), (run.models[after], run.points[after])
+        )
+        for after, before in pairs
+    ]
+    return section.replace("<!--cards-->", "".join(cards)), scenes
 
 
 def measure_change(model: BuildingModel) -> float:

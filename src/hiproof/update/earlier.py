@@ -73,7 +73,10 @@ def read_earlier(folder: Path) -> EarlierRun:
     if not records:
         raise InputError(f"expected buildings in {path}, got none; name another run")
     for row in records:
-        refuse_damaged(row, path)
+        try:
+            refuse_other_kinds(row)  # its geometry is made by the workers
+        except HiproofError as error:
+            raise InputError(f"building {row['id']:.80} in {path}: {error}") from error
     settings = dataclasses.replace(
         Settings.from_dict(record.get("settings") or {}), compose=head.compose, write=head.write
     )
@@ -105,17 +108,6 @@ def find_overrides(folder: Path, record: dict[str, Any]) -> str | None:
             InputWarning,
         )
     return found
-
-
-def refuse_damaged(record: dict[str, Any], path: Path) -> None:
-    """Raise InputError for a building that cannot be read.
-
-    Its geometry is made by the workers.
-    """
-    try:
-        refuse_other_kinds(record)
-    except HiproofError as error:
-        raise InputError(f"building {record['id']:.80} in {path}: {error}") from error
 
 
 def choose_read_settings(settings: Settings) -> Settings:

@@ -55,7 +55,11 @@ def update_area(
     `changes` are settings that differ from the run's, by section. Raises InputError, SettingsError
     or OutputError (full sentences) when the update cannot start or go on; the same call goes on.
     """
-    refuse_same_folder(request)
+    if Path(request.out).resolve() == Path(request.run).resolve():
+        raise OutputError(
+            f"expected another folder than the run itself with --out, got {request.out}; an update "
+            "never changes its run"
+        )
     if not 0 < request.significance < 1:
         raise SettingsError(
             f"expected --significance between 0 and 1, got {request.significance}; 0.001 is usual"
@@ -97,15 +101,6 @@ def update_area(
         summary = reconstruct_in_folder(request, state, progress, steps)
         remove_earlier_points(state)
         return report_changes(request, state, summary)
-
-
-def refuse_same_folder(request: UpdateRequest) -> None:
-    """Raise OutputError where the update would be written into the run that it reads."""
-    if Path(request.out).resolve() == Path(request.run).resolve():
-        raise OutputError(
-            f"expected another folder than the run itself with --out, got {request.out}; an update "
-            "never changes its run"
-        )
 
 
 def report_changes(request: UpdateRequest, state: Path, summary: Summary) -> UpdateSummary:

@@ -73,7 +73,8 @@ def make_policy(page: str) -> str:
     """
     sources = {
         kind: " ".join(
-            hash_text(text) for text in re.findall(rf"<{kind}>(.*?)</{kind}>", page, re.DOTALL)
+            f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
+            for text in re.findall(rf"<{kind}>(.*?)</{kind}>", page, re.DOTALL)
         )
         for kind in ("script", "style")
     }
@@ -81,10 +82,6 @@ def make_policy(page: str) -> str:
     for kind, digests in sources.items():
         policy = policy.replace(f"{kind}-src 'self'", f"{kind}-src {digests or NO_SOURCE}")
     return policy
-
-
-def hash_text(text: str) -> str:
-    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
 
 
 class ViewHandler(LoopbackHandler):

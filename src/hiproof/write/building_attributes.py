@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..frames import METRES, Units
-from ..model import ROOF, Building, Model, Solid
+from ..model import ROOF, Building, Solid
 from ..model.roof_figures import RoofFigures, find_ground_height, roof_figures
 from ..primitives.catalogue import CATALOGUE
 from ..status import Status
@@ -140,7 +140,11 @@ def building_attributes(
     if osm:
         computed |= osm_tags(building, figures)
     if building.built is not None:
-        computed |= {OWN + name: n for name, n in count_further(building.built).items() if n}
+        counts = {
+            "installations": len(building.built.installations),
+            "passages": len(building.built.underside.passages),
+        }
+        computed |= {OWN + name: n for name, n in counts.items() if n}
     if building.built is not None and building.built.eaves is not None:
         volume = building.built.finest_solid.volume
         computed[f"{OWN}volume_lod23"] = round_value(volume, 4)
@@ -230,14 +234,6 @@ def hiproof_attributes(
         "iso19107_lod22": None
         if building.built is None
         else check_as_written(building.solid, units),
-    }
-
-
-def count_further(model: Model) -> dict[str, int]:
-    """Return how many objects stand on a roof, and how many passages lead below it."""
-    return {
-        "installations": len(model.installations),
-        "passages": len(model.underside.passages),
     }
 
 

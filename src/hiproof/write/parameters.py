@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import shapely
 
-from ..model import Building, Installation, Model, Part
+from ..model import Building, Model, Part
 from ..model.roof_figures import RoofFigures
 from .attribute_list import TABLES
 from .fragments import Fragment, Sheet
@@ -154,7 +154,20 @@ def list_further_values(model: Model) -> dict[str, Any]:
     """Return what a building has beside its roof; nothing where it is as usual."""
     values: dict[str, Any] = {}
     if model.installations:
-        values["installations"] = [installation_record(item) for item in model.installations]
+        values["installations"] = [
+            make_record(
+                "installation",
+                {
+                    "type": item.type,
+                    "parameters": {
+                        name: getattr(item, name) for name in ("length", "width", "height")
+                    },
+                    "position": item.position,
+                    "rotation": math.degrees(item.kappa),
+                },
+            )
+            for item in model.installations
+        ]
     if model.underside.terrain:
         values["walls"] = "terrain"
     if model.underside.passages:
@@ -171,20 +184,6 @@ def list_further_values(model: Model) -> dict[str, Any]:
         values["roof_thickness"] = model.eaves.thickness
         values["footprint_kind"] = model.eaves.footprint_kind
     return values
-
-
-def installation_record(installation: Installation) -> dict[str, Any]:
-    return make_record(
-        "installation",
-        {
-            "type": installation.type,
-            "parameters": {
-                name: getattr(installation, name) for name in ("length", "width", "height")
-            },
-            "position": installation.position,
-            "rotation": math.degrees(installation.kappa),
-        },
-    )
 
 
 def part_record(part: Part) -> dict[str, Any]:
@@ -249,13 +248,11 @@ def numbers(values: Iterable[float], digits: int = LENGTH_DIGITS) -> list[float 
     return [number(value, digits) for value in values]
 
 
-def optional_numbers(values: np.ndarray | None) -> list[float | None] | None:
-    return None if values is None else numbers(values)
-
-
 WRITERS: dict[str, Callable[[Any], Any]] = {
     **dict.fromkeys(("number", "number?", "length"), number),
-    **dict.fromkeys(("place", "place?"), optional_numbers),
+    **dict.fromkeys(
+        ("place", "place?"), lambda values: None if values is None else numbers(values)
+    ),
     **dict.fromkeys(("polygon", "polygon?"), outline_record),
     **dict.fromkeys(("numbers", "parameters", "box", "shares", "figures"), by_name),
     "polygon[]": lambda outlines: [outline_record(outline) for outline in outlines],

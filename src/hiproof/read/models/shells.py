@@ -41,7 +41,10 @@ def read_shell(shell: Any, values: Any, surfaces: Any, count: int) -> list[Shell
     `values` are the numbers of the faces' semantics among `surfaces`, None where a file has none; a
     face beyond their end has none either.
     """
-    faces = [read_rings(face, count) for face in require_list(shell, "a shell")]
+    faces = [
+        tuple(tuple(read_ring(ring, count)) for ring in require_list(face, "a face"))
+        for face in require_list(shell, "a shell")
+    ]
     numbers = require_list([] if values is None else values, "semantic values")
     surface_semantics = require_list(surfaces, "semantic surfaces")
     semantics_list = (
@@ -52,10 +55,6 @@ def read_shell(shell: Any, values: Any, surfaces: Any, count: int) -> list[Shell
         ShellSurface(rings, KINDS[semantics.get("type", WALL)], semantics)
         for rings, semantics in zip(faces, semantics_list)  # noqa: B905
     ]
-
-
-def read_rings(face: Any, count: int) -> Rings:
-    return tuple(tuple(read_ring(ring, count)) for ring in require_list(face, "a face"))
 
 
 def read_ring(ring: Any, count: int) -> list[int]:

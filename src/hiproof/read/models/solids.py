@@ -22,7 +22,7 @@ from ...frames import METRES, Units
 from ...log import count_things
 from ...model import WALL, Face, Solid
 from ..crs import find_named_units, refuse_other_crs
-from .cityjson import UNUSABLE, Feature, features, unusable
+from .cityjson import UNUSABLE, features, unusable
 from .damage import Damaged, refuse
 from .shells import read_geometries, read_shell, require_list
 
@@ -100,27 +100,22 @@ def cityjson_solids(path: Path, damaged: Damaged = refuse) -> Iterator[tuple[str
     A line without a transform has that of the line before.
     """
     for feature in features(path, damaged=damaged):
-        yield from feature_solids(feature, damaged)
-
-
-def feature_solids(feature: Feature, damaged: Damaged = refuse) -> Iterator[tuple[str, Solid]]:
-    """Yield the shells of all city objects of one CityJSON object or feature."""
-    for name, city_object in feature.objects.items():
-        try:
-            if isinstance(city_object, dict) and not str(city_object.get("type")).startswith(
-                "Building"
-            ):
+        for name, city_object in feature.objects.items():
+            try:
+                if isinstance(city_object, dict) and not str(city_object.get("type")).startswith(
+                    "Building"
+                ):
+                    continue
+                result = [
+                    solid
+                    for geometry in read_geometries(city_object)
+                    if not str(geometry.get("lod", "")).startswith("0")
+                    for solid in geometry_shells(geometry, feature.vertices)
+                ]
+            except UNUSABLE as error:
+                damaged(unusable(name, feature, error))
                 continue
-            result = [
-                solid
-                for geometry in read_geometries(city_object)
-                if not str(geometry.get("lod", "")).startswith("0")
-                for solid in geometry_shells(geometry, feature.vertices)
-            ]
-        except UNUSABLE as error:
-            damaged(unusable(name, feature, error))
-            continue
-        yield from number_solids(name, result)
+            yield from number_solids(name, result)
 
 
 def geometry_shells(geometry: dict[str, Any], vertices: np.ndarray) -> list[Solid]:
@@ -193,7 +188,8 @@ def citygml_solids(
             if local_name(element) not in ("cityObjectMember", "featureMember"):
                 continue
             members += 1
-            refuse_mixed_crs(element, first_name, path)
+            for name in {part.get("srsName") for part in element.iter()} if first_name else ():
+                refuse_other_crs(first_name, name, f"{gml_id(element[0])} in {path}")
             try:
                 solids = list(member_solids(element, path, without))
             except InputError as error:
@@ -212,12 +208,6 @@ def citygml_solids(
         raise InputError(
             f"expected cityObjectMember elements in {path}, got none; is this a CityGML 2.0 file?"
         )
-
-
-def refuse_mixed_crs(member: Any, first_name: str | None, path: Path) -> None:
-    """Raise InputError for a city object in another CRS than the envelope."""
-    for name in {element.get("srsName") for element in member.iter()} if first_name else ():
-        refuse_other_crs(first_name, name, f"{gml_id(member[0])} in {path}")
 
 
 def find_citygml_crs(path: Path) -> str | None:

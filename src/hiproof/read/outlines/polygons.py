@@ -82,14 +82,12 @@ def unite_polygons(polygons: list[shapely.Polygon]) -> list[shapely.Polygon]:
     whole = shapely.simplify(shapely.union_all(polygons, grid_size=JOIN_M), JOIN_M)
     parts = [part for part in polygons_in(whole) if part.area > SLIVER_M2]
     return [
-        shapely.Polygon(part.exterior, [hole for hole in part.interiors if is_hole(hole)])
+        shapely.Polygon(
+            part.exterior,
+            [hole for hole in part.interiors if shapely.Polygon(hole).area > SLIVER_M2],
+        )
         for part in parts
     ]
-
-
-def is_hole(ring: shapely.LinearRing) -> bool:
-    """Return whether a hole is larger than the gaps between faces."""
-    return shapely.Polygon(ring).area > SLIVER_M2
 
 
 def polygons_in(geometry: shapely.Geometry | None) -> list[shapely.Polygon]:

@@ -98,7 +98,11 @@ def read_facts(file: BinaryIO) -> LasFacts:
     facts = replace(
         facts, laszip=records.get(("laszip encoded", 22204), b""), projection=projection
     )
-    points = compressed_points(file, facts) if facts.compressed else room_for_points(facts)
+    points = (
+        compressed_points(file, facts)
+        if facts.compressed
+        else (facts.points_end - facts.data_start) // facts.point_bytes
+    )
     if points != facts.count:
         raise Implausible(
             f"its header tells of {facts.count} points, its data of {points}; it is truncated or "
@@ -202,10 +206,6 @@ def iterate_records(file: BinaryIO, facts: LasFacts) -> Iterator[tuple[tuple[str
                 )
             content = file.read(length) if length <= 0xFFFF else b""
             yield (user.split(b"\0")[0].decode("latin-1"), number), content
-
-
-def room_for_points(facts: LasFacts) -> int:
-    return (facts.points_end - facts.data_start) // facts.point_bytes
 
 
 def compressed_points(file: BinaryIO, facts: LasFacts) -> int:

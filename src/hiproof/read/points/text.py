@@ -109,7 +109,7 @@ def sniff(path: str | Path) -> TextLayout:
     lines = head.decode("utf-8-sig", errors="replace").splitlines()
     names: list[str] = []
     for number, line in enumerate(lines):
-        text = strip_comment(line)
+        text = line.strip().lstrip("#/").strip()
         delimiter = find_delimiter(text)
         fields = [field for field in text.split(delimiter) if delimiter or field]
         if len(fields) < 3 or not text:  # blank, or the count that starts a PTS file
@@ -139,10 +139,6 @@ def is_of_points(path: str | Path) -> bool:
     except (InputError, OSError):
         return False
     return True
-
-
-def strip_comment(line: str) -> str:
-    return line.strip().lstrip("#/").strip()
 
 
 def find_delimiter(line: str) -> str | None:

@@ -178,7 +178,11 @@ def building_element(sheet: Sheet) -> str:
     ]
     text += [generic_attribute(key, value) for key, value in sheet.attributes.items()]
     if figures is not None:
-        types = list_visible_types(building)
+        types = [
+            part.type
+            for part, area in zip(building.parts, building.model.visible_m2, strict=True)
+            if area > 0.0
+        ]
         text.append(
             format_roof_and_height(types, figures, find_ground_height(building, figures), write)
         )
@@ -250,15 +254,6 @@ def part_element(sheet: Sheet, number: int, part: PartShape) -> str:
         text += [lod2_surfaces(rings)] if sheet.head.write.gml_surfaces else []
         text += boundary_surfaces(part.solid, sheet.building.parts, part.figures, ids, rings)
     return "".join([*text, "</bldg:BuildingPart></bldg:consistsOfBuildingPart>"])
-
-
-def list_visible_types(building: Building) -> list[str]:
-    """Return the roof types of the parts that are seen from above."""
-    return [
-        part.type
-        for part, area in zip(building.parts, building.model.visible_m2, strict=True)
-        if area > 0.0
-    ]
 
 
 def format_roof_and_height(

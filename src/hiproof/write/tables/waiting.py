@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Iterator
 from itertools import islice
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 from ..attribute_list import OWN, TABLES
 from .rows import Row
@@ -34,7 +34,10 @@ class WaitingRows:
         for _, values in json.loads(line):
             self.count += 1
             for name, value in values.items():
-                self.found.setdefault(name, set()).add(classify_value(value))
+                self.found.setdefault(name, set()).add(
+                    # whole numbers beyond 64 bits count as text
+                    str if type(value) is int and abs(value) >= 2**63 else type(value)
+                )
         self.file.write(line + b"\n")
 
     @property
@@ -79,14 +82,6 @@ class WaitingRows:
         yield list(islice(rows, BATCH_ROWS))
         while batch := list(islice(rows, BATCH_ROWS)):
             yield batch
-
-
-def classify_value(value: Any) -> type:
-    """Return bool, int, float, str or NoneType.
-
-    Whole numbers beyond 64 bits count as text.
-    """
-    return str if type(value) is int and abs(value) >= 2**63 else type(value)
 
 
 def column_kind(result: set[type], declared: str) -> type:

@@ -52,7 +52,14 @@ def write_models(
     folder, globe = Path(folder), None if crs is None else Globe.of(crs, geoid_height_m)
     make_room(folder)
     with scratch(folder) as file:
-        warn_guesses(globe)
+        if globe is None:
+            warnings.warn(
+                InputWarning(
+                    "no CRS is known, so the tiles stand nowhere on the globe; say it with --crs"
+                )
+            )
+        elif not globe.is_known:
+            warnings.warn(InputWarning(globe.heights))
         city = WaitingCity(file, globe)
         for model in buildings:
             city.add(model)
@@ -69,18 +76,6 @@ def write_models(
             text = json.dumps(tiles.tileset(tree), separators=(",", ":"), allow_nan=False)
             (temporary / TILESET).write_text(text)
     return len(city.offsets)
-
-
-def warn_guesses(globe: Globe | None) -> None:
-    """Say in a sentence what is guessed of the place."""
-    if globe is None:
-        warnings.warn(
-            InputWarning(
-                "no CRS is known, so the tiles stand nowhere on the globe; say it with --crs"
-            )
-        )
-    elif not globe.is_known:
-        warnings.warn(InputWarning(globe.heights))
 
 
 class WaitingCity:
