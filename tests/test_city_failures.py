@@ -8,7 +8,7 @@ from click.testing import CliRunner
 from hiproof import method
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.city.work import solve
-from hiproof.city.work.bundles import folder_name
+from hiproof.city.work.bundle_folders import folder_name
 from hiproof.classify import buildings, split
 from hiproof.cli.app import app
 from hiproof.model import Footprint

@@ -18,7 +18,7 @@ from hiproof.city import run as city_run
 from hiproof.city.folder.ledger import Ledger
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.city.work import queue
-from hiproof.city.work.bundles import bundles_in
+from hiproof.city.work.bundle_folders import bundles_in
 from hiproof.city.work.sort import Gatherer
 from hiproof.errors import InputError, InputWarning, OutputError
 from hiproof.geometry.thin import thin_to_count, without_repeats

@@ -14,7 +14,7 @@ import hiproof
 from hiproof.city import run as city_run
 from hiproof.city.folder.ledger import Ledger
 from hiproof.city.plan.overrides import table_records
-from hiproof.city.work.sort import noted_file, save_run_boxes
+from hiproof.city.work.noted import noted_file, save_run_boxes
 from hiproof.compose import check_solid
 from hiproof.errors import InputError, InputWarning
 from hiproof.parametric.override import overridden, read_override

@@ -40,7 +40,7 @@ from .plan.overrides import REDO
 from .plan.prepare import make_plan
 from .plan.work_plan import WorkPlan
 from .request import Request
-from .work.bundles import FAILURES_FOLDER, bundles_in, remove_bundles
+from .work.bundle_folders import FAILURES_FOLDER, bundles_in, remove_bundles
 from .work.cores import as_many_as_pay
 from .work.executors import make_executor
 from .work.queue import Queue

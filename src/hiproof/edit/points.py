@@ -16,8 +16,9 @@ import numpy as np
 
 from ..city.folder.resume import STATE_FOLDER
 from ..city.plan.work_plan import PLAN_FILE, Job, WorkPlan
+from ..city.work.noted import noted_file
 from ..city.work.solve import terrain_model
-from ..city.work.sort import Gatherer, Reaches, noted_file, wanted_points
+from ..city.work.sort import Gatherer, Reaches, wanted_points
 from ..city.work.surveys import SurveyPoints
 from ..errors import HiproofError, InputError
 from ..evaluate.inputs import found_inputs

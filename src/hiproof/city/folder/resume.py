@@ -29,8 +29,8 @@ from ..plan.overrides import REDO, keep_overrides
 from ..plan.prepare import make_plan
 from ..plan.work_plan import PLAN_FILE, WorkPlan, encode_passages
 from ..request import Request
-from ..work.bundles import remove_bundles
-from ..work.sort import NOTED_FOLDER
+from ..work.bundle_folders import remove_bundles
+from ..work.noted import NOTED_FOLDER
 from .ledger import Ledger
 from .marks import compute_mark, describe_inputs, describe_selection, find_changed_files
 

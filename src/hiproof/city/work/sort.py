@@ -11,7 +11,6 @@ What a building gets out of them depends on its own area alone, not on tiles, fi
 from __future__ import annotations
 
 import functools
-import zipfile
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -29,12 +28,12 @@ from ...model import PointCloud
 from ...read.points.las import is_copc
 from ...read.points.lax import read_lax
 from ...read.points.pointcloud import as_input_error, file_kind, iter_points, read_header
-from ...read.points.runs import RunIndex, make_index
 from ...settings import ReadSettings
 from ...write.files import atomic_file
 from ..plan.overrides import REDO, load_redo
 from ..plan.work_plan import PLAN_FILE, WorkPlan, load_plan
 from .ground import lowest_in_cells
+from .noted import load_run_boxes, noted_file, save_run_boxes
 
 NOISE_CLASSES = (7, 18)  # of ASPRS: low and high noise
 POINT_KINDS = ("roof", "ground", "low", "noise")
@@ -265,7 +264,7 @@ def wanted_points(
 
     They are all of its chunks; unless it `is_whole`, of a file with a spatial index, or with the
     places of its points in the file `noted`, only what holds buildings' surroundings. Where it is
-    read from end to end, `result` gets these places (`save_run_boxes`).
+    read from end to end, `result` gets these places (noted.py).
     """
     if file_kind(path) != "las":
         return iter_points(path, units=units)
@@ -331,36 +330,3 @@ def load_points(root: Path, tile: str, epoch: str = "") -> dict[str, np.ndarray]
             for kind in part.files:
                 result[kind].append(part[kind])
     return {kind: np.concatenate(arrays) for kind, arrays in result.items()}
-
-
-NOTED_FOLDER = "noted"
-
-
-def noted_file(state: Path, number: int) -> Path:
-    """Return where the runs of point file `number` are noted.
-
-    The run's state is in `state`.
-    """
-    return state / NOTED_FOLDER / f"{number}.npz"
-
-
-def save_run_boxes(path: Path, boxes: list[np.ndarray], points: int) -> None:
-    """Note where the runs of a file of so many `points` lie.
-
-    `boxes` are arrays (k, 4) one after the other.
-    """
-    with atomic_file(path) as file:
-        np.savez(file, boxes=np.concatenate([np.zeros((0, 4)), *boxes]), points=np.int64(points))
-
-
-def load_run_boxes(path: Path, points: int) -> RunIndex | None:
-    """Load the note of a file that has so many `points`.
-
-    It is None where there is nothing usable.
-    """
-    try:
-        with np.load(path, allow_pickle=False) as arrays:
-            boxes, noted_points = arrays["boxes"], int(arrays["points"])
-    except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile):
-        return None
-    return make_index(boxes, points) if noted_points == points else None
