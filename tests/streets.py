@@ -5,8 +5,8 @@ import math
 from pathlib import Path
 
 from hiproof.enrich.answer import answer
+from hiproof.enrich.party import Town
 from hiproof.enrich.records import Records, index_records
-from hiproof.enrich.town import Town
 from sample_parameters import HEAD
 
 WORLD = (85000.0, 446000.0, 0.0)

@@ -8,7 +8,7 @@ import shapely
 
 from hiproof.compose import check_solid, compose
 from hiproof.compose import solid as composing
-from hiproof.compose.bends import bent_faces
+from hiproof.compose.check_faces import bent_faces
 from hiproof.compose.zones import ATTEMPTS, WHOLE_PLAN, Zone
 from hiproof.geometry.flat_shell import FlatShell
 from hiproof.model import Face, Solid

@@ -5,10 +5,10 @@ import pytest
 import shapely
 
 import hiproof
-from hiproof.compose import check_solid, compose, valid_eaves
-from hiproof.compose.eaves import add_eaves
+from hiproof.compose import check_solid, compose
+from hiproof.compose import eaves as valid_eaves
+from hiproof.compose.eaves import add_eaves, add_valid_eaves, measure_left_out
 from hiproof.compose.settle import settled_roof
-from hiproof.compose.valid_eaves import add_valid_eaves, measure_left_out
 from hiproof.errors import CompositionError
 from hiproof.geometry.outline_edges import list_outline_edges
 from hiproof.model import CEILING, GROUND, Eaves, Model, Overhang

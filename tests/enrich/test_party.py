@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hiproof.compose import check_solid
-from hiproof.enrich.areas import OF_3DBAG, area_vectors
+from hiproof.enrich.walls import OF_3DBAG, area_vectors
 from streets import answer_street, list_party, lose_house, place_house
 
 GABLE = {"eave": 5.0, "rise": 3.0}

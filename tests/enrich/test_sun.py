@@ -8,11 +8,11 @@ from click.testing import CliRunner
 
 from hiproof.cli.app import app
 from hiproof.enrich.answer import answer
-from hiproof.enrich.areas import area_vectors, measure_faces
 from hiproof.enrich.cadastre import Cadastre, locate, measure_panels
 from hiproof.enrich.horizon import SECTORS, find_horizon, measure_share
 from hiproof.enrich.run import enrich_run
 from hiproof.enrich.sun import irradiate, make_sky, measure_sky, sample_face
+from hiproof.enrich.walls import area_vectors, measure_faces
 from hiproof.errors import InputError
 from hiproof.model import ROOF, WALL
 from hiproof.settings import EnrichSettings

@@ -5,8 +5,8 @@ import pytest
 
 from hiproof.compose import check_solid
 from hiproof.errors import InputError
+from hiproof.parametric.arrange import replace_part, with_recess
 from hiproof.parametric.building import build
-from hiproof.parametric.recess import replace_part, with_recess
 from hiproof.write.parameters import building_record
 from parametric_house import gable_house
 

@@ -8,8 +8,8 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
+from hiproof.city.plan.overrides import check_number_columns
 from hiproof.city.plan.passages import add_passages
-from hiproof.city.plan.table_values import check_number_columns
 from hiproof.city.request import Request
 from hiproof.errors import InputError, InputWarning
 from hiproof.model import Footprint

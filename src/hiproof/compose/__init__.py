@@ -16,12 +16,10 @@ shell             roof, wall and ground faces that share them
 check             whether the result is valid by ISO 19107
 check_faces       its rules for each face by itself
 check_shell       its rules for the shell of sound faces
-bends             which faces are bent (val3dity's 204)
 blocks            LoD1: prisms over the outline; installations on roofs
 underside         walls down to the terrain, and passages below a solid
 overhang          slabs of a roof beyond walls
-eaves             a model with overhangs
-valid_eaves       as many overhangs as make a valid solid
+eaves             a model with overhangs, as many as make a valid solid
 building_parts    a solid cut where its roofs meet, for formats that know building parts
 """
 

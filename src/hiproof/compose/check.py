@@ -11,8 +11,7 @@ import numpy as np
 
 from ..geometry.flat_shell import FlatShell, weld
 from ..model import Solid
-from .bends import bent_faces
-from .check_faces import check_faces
+from .check_faces import bent_faces, check_faces
 from .check_shell import check_shell
 
 CODES = {

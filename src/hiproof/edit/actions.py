@@ -13,11 +13,10 @@ import numpy as np
 
 from ..errors import InputError
 from ..model import Building, Quality
-from ..parametric.arrange import add_dormer, merged_parts, split_part
+from ..parametric.arrange import add_dormer, merged_parts, replace_part, split_part, with_recess
 from ..parametric.building import build
 from ..parametric.change import changed_part
 from ..parametric.edit import BY_HAND
-from ..parametric.recess import replace_part, with_recess
 from ..parametric.record import list_at, number, place, read_building, require_mapping
 from ..parametric.refit import measure_building, refit_parts, refit_parts_freely, select_inside
 from ..settings import Settings

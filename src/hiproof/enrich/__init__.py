@@ -1,11 +1,9 @@
 """Answers from finished models: party walls, areas, house types, storeys, the sun.
 
 records     the buildings of a parameters.jsonl, read one by one in any order
-walls       the upright faces of a solid, each a polygon in its own plane
-party       where the walls of two buildings touch
+walls       the upright faces of a solid, each a polygon in its own plane; areas of all faces
+party       where the walls of two buildings touch, and of all of a run
 cut         a solid whose walls are cut along their party walls
-town        the buildings of a run with their walls and where these touch
-areas       areas of outer walls, party walls, roofs and grounds
 house_type  the type of a house by the houses that it touches, its size, and its use
 horizon     the horizon that buildings make around places on roofs, compiled
 far         the horizon of a terrain model, or of a file as PVGIS has it

@@ -14,12 +14,11 @@ from ..model import ROOF, Building, Solid
 from ..model.roof_figures import LEVEL_RIDGE_M, find_ground_height, make_triangles, roof_figures
 from ..write.attribute_list import OWN
 from ..write.values import plain_text, round_value
-from .areas import OF_3DBAG, area_vectors, measure_areas
 from .cadastre import Cadastre
 from .cut import Region, cut_walls
 from .house_type import is_residential, name_house_type, name_tabula_class
-from .party import Contact
-from .town import Town
+from .party import Contact, Town
+from .walls import OF_3DBAG, area_vectors, measure_areas
 
 RESIDENTIAL_STOREY_M, OTHER_STOREY_M = (2.5, 3.3), (3.0, 5.0)
 """Least and greatest height (m) of a storey, floor to floor: of dwellings from the least ceiling

@@ -17,13 +17,12 @@ from ..settings import EnrichSettings
 from ..write.attribute_list import OWN
 from ..write.head import FileHead
 from ..write.values import round_value
-from .areas import measure_faces
 from .far import TerrainHorizon, open_terrain, read_horizon
 from .horizon import SECTORS
+from .party import Town
 from .records import MOST_KEPT, Records
 from .sun import Irradiation, Sky, irradiate, make_sky, sample_face, sample_wall
-from .town import Town
-from .walls import find_walls
+from .walls import find_walls, measure_faces
 from .weather import import_pvlib, name_sky
 
 SHADE_REACH_M = 200.0  # distance (m) up to which buildings shade

@@ -19,8 +19,8 @@ from ..write.citygml.surfaces import surface_ids
 from ..write.citygml.version2 import choose_solid
 from ..write.fragments import Sheet
 from ..write.values import round_value, xml_text
-from .areas import measure_faces
 from .house_type import is_house
+from .walls import measure_faces
 
 ENERGY_NAMESPACE = "http://www.sig3d.org/citygml/2.0/energy/1.0"
 BUILDING_TYPES = "https://episcope.eu/building-typology/"  # TABULA's classes

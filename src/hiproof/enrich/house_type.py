@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ..model import Building
-from .town import Town
+from .party import Town
 
 # A building of less ground (m2) or height (m) is a shed or a garage: no house, and no neighbour
 # that makes a row.

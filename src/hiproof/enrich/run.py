@@ -41,8 +41,8 @@ from ..write.values import plain_text
 from .answer import Answers, answer
 from .cadastre import Cadastre, refuse_unfit, refuse_unusable
 from .energy import refuse_other_citygml, write_energy
+from .party import Town
 from .records import Index, Records, index_records
-from .town import Town
 from .weather import name_sky
 
 NOT_MADE = ("parameters",)

@@ -1,4 +1,4 @@
-"""The upright faces of a solid, each a polygon in its own plane."""
+"""The upright faces of a solid, each a polygon in its own plane; areas of all faces."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ import numpy as np
 import shapely
 
 from ..geometry.rings import repair_polygons, ring_normals
-from ..model import WALL, Solid
+from ..model import CEILING, GROUND, ROOF, WALL, Solid
+from ..model.roof_figures import FLAT_SLOPE_DEG, make_triangles, sum_by_face
 
 # Share of a wall's area that plan may show. Coordinates rounded to a tenth of a millimetre tilt a
 # wall of 1 m by 1e-4.
@@ -55,3 +56,46 @@ def make_wall(solid: Solid, number: int, normal: np.ndarray, origin: np.ndarray)
         rings.append(np.column_stack([(xyz[:, :2] - origin) @ along, xyz[:, 2]]))
     polygon = shapely.Polygon(rings[0], rings[1:])
     return Wall(number, origin, along, polygon if polygon.is_valid else repair_polygons(polygon))
+
+
+OF_3DBAG = {
+    "ground_area_m2": "b3_opp_grond",
+    "flat_roof_area_m2": "b3_opp_dak_plat",
+    "sloped_roof_area_m2": "b3_opp_dak_schuin",
+    "outer_wall_area_m2": "b3_opp_buitenmuur",
+    "party_wall_area_m2": "b3_opp_scheidingsmuur",
+}
+"""3DBAG's name of each area that it has too."""
+
+
+def measure_areas(solid: Solid, party_m2: float) -> dict[str, float]:
+    """Return areas (m2) by name; `party_m2` of its walls are party walls.
+
+    A roof face is flat below FLAT_SLOPE_DEG, as its azimuth is null there. Ceilings over passages
+    count as ground.
+    """
+    vectors = area_vectors(solid)
+    size = np.linalg.norm(vectors, axis=1)
+    kinds = np.array([face.kind for face in solid.faces])
+    slope = np.degrees(np.arctan2(np.hypot(vectors[:, 0], vectors[:, 1]), vectors[:, 2]))
+    walls = float(size[kinds == WALL].sum())
+    return {
+        "ground_area_m2": float(size[(kinds == GROUND) | (kinds == CEILING)].sum()),
+        "flat_roof_area_m2": float(size[(kinds == ROOF) & (slope < FLAT_SLOPE_DEG)].sum()),
+        "sloped_roof_area_m2": float(size[(kinds == ROOF) & (slope >= FLAT_SLOPE_DEG)].sum()),
+        "outer_wall_area_m2": max(walls - party_m2, 0.0),
+        "party_wall_area_m2": party_m2,
+    }
+
+
+def area_vectors(solid: Solid) -> np.ndarray:
+    """Return the vector areas (faces, 3) of a solid's faces."""
+    triangles = make_triangles(solid, solid.vertices.mean(axis=0))
+    return sum_by_face(triangles.vectors, triangles.face_of, len(solid.faces))
+
+
+def measure_faces(solid: Solid) -> tuple[np.ndarray, np.ndarray]:
+    """Return the areas (n,) and unit normals (n, 3) of a solid's faces."""
+    vectors = area_vectors(solid)
+    size = np.linalg.norm(vectors, axis=1)
+    return size, vectors / np.maximum(size, 1e-12)[:, None]

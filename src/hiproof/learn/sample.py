@@ -1,4 +1,7 @@
-"""The training data: one labelled cloud, and the roles of a source."""
+"""The training data: one labelled cloud, and the roles of a source.
+
+Clouds are changed at random after PointNeXt's recipe.
+"""
 
 from __future__ import annotations
 
@@ -36,3 +39,47 @@ class Source(Protocol):
     def description(self) -> str: ...
 
     def sample(self, role: int, index: int) -> Sample: ...
+
+
+FEWEST_KEPT = 30  # points that dropping leaves of a cloud; fewer show no roof
+ALONG_AXES, ACROSS_AXES = (0, 3, 8), (1, 4, 9)
+"""Columns of the features that change sign when a building is mirrored along or across its own
+first axis.
+"""
+
+
+@dataclass(frozen=True)
+class AugmentSettings:
+    """Bounds of the random changes.
+
+    `scale` is relative, `jitter_m` the largest standard deviation, `drop` a share.
+    """
+
+    scale: float = 0.12
+    stretch: float = 0.08
+    jitter_m: float = 0.04
+    drop: float = 0.4
+
+
+def vary_cloud(
+    xyz: np.ndarray, labels: np.ndarray, rng: np.random.Generator, settings: AugmentSettings
+):
+    """Scale, stretch, thin and jitter a cloud (n, 3) with labels (n,)."""
+    mask = rng.random(len(xyz)) >= settings.drop * rng.random() ** 2
+    if mask.sum() >= FEWEST_KEPT:
+        xyz, labels = xyz[mask], labels[mask]
+    factor = np.full(3, 1.0 + settings.scale * rng.uniform(-1, 1))
+    factor[2] *= 1.0 + settings.stretch * rng.uniform(-1, 1)
+    return xyz * factor + settings.jitter_m * rng.random() * rng.standard_normal(xyz.shape), labels
+
+
+def symmetric(features: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Mirror arranged features (N, 11) along and across the building.
+
+    Each happens every second time.
+    """
+    features = features.copy()
+    for columns in (ALONG_AXES, ACROSS_AXES):
+        if rng.random() < 0.5:
+            features[:, columns] *= -1
+    return features

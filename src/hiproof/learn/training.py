@@ -24,12 +24,11 @@ from ..errors import InputError, OutputError, SettingsError
 from ..progress import Update, count_progress, ignore_progress
 from ..segment.arrange import Layout, arrange
 from ..segment.scores import Scores
-from .augment import AugmentSettings, symmetric, vary_cloud
 from .card import write_card, write_curve
 from .data import open_source
 from .export import export, read_weights
 from .network import NetworkSettings, RoofNetwork, network_inputs
-from .sample import TRAINING, VALIDATION, Sample, Source
+from .sample import TRAINING, VALIDATION, AugmentSettings, Sample, Source, symmetric, vary_cloud
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,7 @@ building    the object built: composed, checked, measured, as a run does
 run         a file of parameters into the files of a run
 finished    finished models read building by building, of any file
 change      one part changed: another type, a height, a side
-arrange     parts put otherwise: cut in two, joined, a dormer set on a slope
-recess      a level part that takes the place of what it covers, and goes where it is moved
+arrange     parts put otherwise: cut in two, joined, a dormer, a recess
 edit        a building with another part, or without one
 refit       heights and pitches of given parts fitted to points
 override    what a person says of a building, obeyed by the fit

@@ -11,9 +11,9 @@ from ..errors import InputError
 from ..model import Building, Quality
 from ..status import Status
 from ..write.parameters import building_record
+from .arrange import replace_part
 from .building import build
 from .change import changed_part
-from .recess import replace_part
 
 BY_HAND = "changed by hand"
 

@@ -6,8 +6,7 @@ sampling    farthest points and ball neighbours, compiled
 arrange     a cloud in its canonical frame, as the network takes it (shared with training)
 inference   the session and `segment`
 files       `hiproof segment`: clouds in, labels out
-nearest     which class stands for a type that is none
-posterior   `combine`: the network's prior times the fits' evidence
+posterior   `combine`: the network's prior times the fits' evidence, and stand-ins of types
 scores      figures of a classification
 """
 

@@ -21,7 +21,7 @@ from ..extras import import_extra
 from ..log import count_things
 from ..settings import Settings
 from .arrange import Arrangement, Layout, arrange
-from .nearest import find_nearest_type
+from .posterior import find_nearest_type
 
 FORMAT = "hiproof-roof-types-2"
 INPUT_NAMES = (

@@ -1,6 +1,7 @@
 """Prior times evidence: the posterior of the roof type.
 
-The prior is the network's probabilities, the evidence the fits' BIC.
+The prior is the network's probabilities, the evidence the fits' BIC. A type that the network does
+not know has the first one that it knows of the same CityGML code.
 """
 
 from __future__ import annotations
@@ -10,10 +11,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .nearest import find_nearest_type
-
 if TYPE_CHECKING:
     from ..model import Fit
+from collections.abc import Iterable
+
+from ..primitives import CATALOGUE
 
 # Calibrated on simulated buildings of 2-10 points/m2 and on scanned real shapes (`python -m
 # benchmarks.segment --calibrate`). The evidence is tempered because it counts the points as
@@ -120,3 +122,26 @@ def expected_distance(fit: Fit) -> float:
     """
     on_roof = np.sqrt(2 / np.pi) * fit.noise_m  # mean of the absolute value of a normal
     return (1 - fit.outlier_share) * on_roof + fit.outlier_share * OUTLIER_DISTANCE_M
+
+
+def find_nearest_type(name: str, known_types: Iterable[str]) -> str:
+    """Return `name`, or the first of the `known_types` with its code.
+
+    `name` also where there is none.
+
+    >>> find_nearest_type("side_hip", ("gable", "hip", "pyramid")), find_nearest_type("shed",
+    ...     ("gable", "hip"))
+    ('hip', 'shed')
+    """
+    known_types = tuple(known_types)
+    if name in known_types or name not in CATALOGUE:
+        return name
+    code = CATALOGUE[name].citygml_code
+    return next(
+        (
+            other
+            for other in known_types
+            if other in CATALOGUE and CATALOGUE[other].citygml_code == code
+        ),
+        name,
+    )

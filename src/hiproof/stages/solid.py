@@ -149,7 +149,7 @@ def add_overhangs(
     """
     if building.built is None or "2.3" not in settings.write.lods:
         return building
-    from ..compose.valid_eaves import add_valid_eaves, measure_left_out
+    from ..compose.eaves import add_valid_eaves, measure_left_out
     from ..fit.overhang import find_eaves
 
     frame = building.roof.frame

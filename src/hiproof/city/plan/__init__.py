@@ -12,5 +12,4 @@ registration  the common shift of all footprints, before there are tiles
 outlines      those of all buildings around, and the rows that touching ones form
 passages      passages below buildings, of a layer or a column
 overrides     what is known better of some buildings
-table_values  values of columns as overrides want them
 """

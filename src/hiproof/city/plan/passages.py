@@ -15,7 +15,7 @@ from ...model import Footprint
 from ...read.numbers import MOST_SHOWN_VALUES, read_number
 from ...read.plausible import HIGHEST_BUILDING_M
 from ..request import Request
-from .table_values import refuse_missing_column
+from .overrides import refuse_missing_column
 
 if TYPE_CHECKING:
     from .frame import AreaFrame

@@ -24,8 +24,8 @@ from .classes import settle_classes
 from .from_cloud import Progress, jobs_from_cloud
 from .from_overture import with_overture
 from .outlines import MOST_ROW_M
+from .overrides import check_number_columns
 from .passages import add_passages
-from .table_values import check_number_columns
 from .work_plan import (
     VOID_REACH_M,
     Job,
