@@ -30,7 +30,7 @@ from hiproof.compose import check_solid, compose
 from hiproof.errors import HiproofError
 from hiproof.fit.roof import fit_building
 from hiproof.frames import LocalFrame
-from hiproof.geometry.point_grid import assign_points
+from hiproof.geometry.point_grid import PointGrid
 from hiproof.model import ROOF, Building, Footprint, Model, Roof
 from hiproof.read import read_footprints, read_points
 from hiproof.settings import Settings
@@ -111,7 +111,8 @@ def read_set(
     footprints = select_footprints(data / (SETS | EPOCHS)[name], parity)
     clouds = sorted((data / EPOCH if name in EPOCHS else data).glob("*.laz"))
     cloud = thin_points(clouds, share)
-    indices = assign_points(cloud, footprints)
+    grid = PointGrid(cloud)
+    indices = [grid.inside(f.polygon) for f in footprints]
     return Asked(
         footprints,
         clouds,

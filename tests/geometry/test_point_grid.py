@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import shapely
 
-from hiproof.geometry.point_grid import PointGrid, assign_points
+from hiproof.geometry.point_grid import PointGrid
 from hiproof.model import Footprint
 
 
@@ -32,11 +32,12 @@ def test_the_grid_finds_what_a_plain_test_of_every_point_finds(seed, offset):
     footprints = [
         Footprint(f.id, shapely.transform(f.polygon, lambda xy: xy + offset)) for f in footprints
     ]
-    for footprint, result in zip(footprints, assign_points(xyz, footprints), strict=True):
-        assert np.array_equal(
-            result, np.flatnonzero(shapely.intersects_xy(footprint.polygon, xyz[:, 0], xyz[:, 1]))
-        )
     grid = PointGrid(xyz)
+    for footprint in footprints:
+        assert np.array_equal(
+            grid.inside(footprint.polygon),
+            np.flatnonzero(shapely.intersects_xy(footprint.polygon, xyz[:, 0], xyz[:, 1])),
+        )
     for footprint in footprints:
         result = grid.find_within(footprint.polygon, 3.0)
         distance = shapely.distance(footprint.polygon, shapely.points(xyz[:, :2]))
@@ -47,15 +48,13 @@ def test_the_grid_finds_what_a_plain_test_of_every_point_finds(seed, offset):
 
 def test_neighbours_do_not_take_points_from_each_other():
     xy = np.array([[0.5, 0.5], [1.5, 0.5]])
-    footprints = [Footprint("a", shapely.box(0, 0, 2, 1)), Footprint("b", shapely.box(1, 0, 3, 1))]
-    assert [result.tolist() for result in assign_points(xy, footprints)] == [[0, 1], [1]]
+    grid = PointGrid(xy)
+    assert grid.inside(shapely.box(0, 0, 2, 1)).tolist() == [0, 1]
+    assert grid.inside(shapely.box(1, 0, 3, 1)).tolist() == [1]
 
 
 def test_no_points_and_no_polygon_find_nothing():
-    footprints = [Footprint("a", shapely.box(0, 0, 1, 1)), Footprint("b", shapely.Polygon())]
-    assert [len(result) for result in assign_points(np.empty((0, 3)), footprints)] == [0, 0]
-    assert [len(result) for result in assign_points(np.ones((4, 3)) * 0.5, footprints)] == [
-        4,
-        0,
-    ]
+    square, nothing = shapely.box(0, 0, 1, 1), shapely.Polygon()
+    for xyz, counts in ((np.empty((0, 3)), [0, 0]), (np.ones((4, 3)) * 0.5, [4, 0])):
+        assert [len(PointGrid(xyz).inside(polygon)) for polygon in (square, nothing)] == counts
     assert len(PointGrid(np.ones((4, 2))).inside(shapely.box(1e6, 1e6, 1e6 + 1, 1e6 + 1))) == 0

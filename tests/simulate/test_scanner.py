@@ -24,8 +24,8 @@ from hiproof.simulate import (
 )
 from hiproof.simulate.flight import Swath, make_beams
 from hiproof.simulate.raycast import cast_crowns
-from hiproof.simulate.scanner import bare_scene, first_hits, returns
-from hiproof.simulate.scene import Body, make_scene
+from hiproof.simulate.scanner import first_hits, returns
+from hiproof.simulate.scene import Body, building_bodies, make_scene
 
 ROOF, WALL, GROUND = (SOURCES.index(name) for name in ("roof", "wall", "ground"))
 EXACT = ScanSettings(
@@ -94,7 +94,7 @@ def test_compiled_beams_equal_a_slow_walk(type):
     building = random_building(rng, type)
     xy0 = rng.uniform(-9, 9, (60, 2))
     slope = rng.uniform(-0.4, 0.4, (60, 2))
-    z_fast, _, _ = first_hits(bare_scene(building), xy0, slope)
+    z_fast, _, _ = first_hits(make_scene(building_bodies(building)), xy0, slope)
     assert np.abs(z_fast - slow_first_hit(building, xy0, slope)).max() < 0.003
 
 
@@ -107,7 +107,9 @@ def test_heading_changes_no_label():
         beams = make_beams(
             np.random.default_rng(4), Swath(heading, 0.5, 0.4, 0.2), np.zeros(2), 12.0, 0.0
         )
-        cloud = returns(bare_scene(building), beams, np.random.default_rng(4), EXACT)
+        cloud = returns(
+            make_scene(building_bodies(building)), beams, np.random.default_rng(4), EXACT
+        )
         if heading == 0.0:
             first = cloud
         assert np.array_equal(cloud.label, first.label) and np.array_equal(
@@ -117,7 +119,10 @@ def test_heading_changes_no_label():
             np.random.default_rng(4), Swath(heading, 0.5, 0.4, 0.0), np.zeros(2), 12.0, 0.0
         )
         assert (
-            WALL not in returns(bare_scene(building), nadir, np.random.default_rng(4), EXACT).source
+            WALL
+            not in returns(
+                make_scene(building_bodies(building)), nadir, np.random.default_rng(4), EXACT
+            ).source
         )
 
 

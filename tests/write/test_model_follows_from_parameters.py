@@ -13,7 +13,7 @@ from benchmarks.campaign_scenes import SceneSettings, place_building
 
 import hiproof
 from hiproof import method
-from hiproof.geometry.point_grid import assign_points
+from hiproof.geometry.point_grid import PointGrid
 from hiproof.read import read_footprints, read_points
 from hiproof.settings import Settings
 from hiproof.simulate import SOURCES
@@ -36,10 +36,9 @@ def buildings(clouds, footprints, limit):
         footprints_read[k]
         for k in np.random.default_rng(0).permutation(len(footprints_read))[:limit]
     ]
-    indices = assign_points(xyz, footprints_read)
+    grid = PointGrid(xyz)
     return [
-        hiproof.reconstruct(xyz[i], f, settings=PLAIN)
-        for i, f in zip(indices, footprints_read, strict=True)
+        hiproof.reconstruct(xyz[grid.inside(f.polygon)], f, settings=PLAIN) for f in footprints_read
     ]
 
 

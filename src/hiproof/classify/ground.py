@@ -73,11 +73,11 @@ def ground_grid(xyz: np.ndarray, cell_m: float = CELL_M) -> GroundGrid:
     return GroundGrid(np.array(first) * cell_m, fill_gaps(remove_objects(lowest, cell_m)), cell_m)
 
 
-def bare_points(lowest: np.ndarray, cell_m: float = CELL_M) -> np.ndarray:
+def bare_points(lowest: np.ndarray) -> np.ndarray:
     """Return the ground's points among (m, 3), which are at most one a cell."""
-    first, table = lowest_in_cells(lowest, cell_m)
-    column, row = (np.floor(lowest[:, :2] / cell_m).astype(np.int64) - first).T
-    return lowest[np.isfinite(remove_objects(table, cell_m))[column, row]]
+    first, table = lowest_in_cells(lowest, CELL_M)
+    column, row = (np.floor(lowest[:, :2] / CELL_M).astype(np.int64) - first).T
+    return lowest[np.isfinite(remove_objects(table, CELL_M))[column, row]]
 
 
 def lowest_in_cells(xyz: np.ndarray, cell_m: float) -> tuple[tuple[int, int], np.ndarray]:

@@ -6,8 +6,7 @@ Points are sorted once into grid cells, and then looked up building by building.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 import shapely
@@ -108,15 +107,3 @@ def grow_polygon(polygon: shapely.Polygon, distance_m: float, **options: int) ->
     if shapely.get_num_coordinates(polygon) > MANY_VERTICES:
         polygon = shapely.simplify(polygon, distance_m / 10)
     return shapely.buffer(polygon, distance_m, **options)
-
-
-def assign_points(cloud_xyz: np.ndarray, footprints: Iterable[Any]) -> list[np.ndarray]:
-    """Return for each footprint or polygon the ascending indices of its points.
-
-    Indices are into `cloud_xyz` (n, 2 or 3). Points on the border count as inside.
-
-    Pass the building-class points only. A point in the overlap of two footprints belongs to both:
-    what a building gets never depends on its neighbours.
-    """
-    grid = PointGrid(cloud_xyz)
-    return [grid.inside(getattr(footprint, "polygon", footprint)) for footprint in footprints]

@@ -54,10 +54,6 @@ class Scores:
         return float(np.mean(list(self.recalls.values())))
 
     @property
-    def lowest_recall(self) -> float:
-        return min(self.recalls.values())
-
-    @property
     def mean_iou(self) -> float:
         """Mean over the classes that occur of intersection over union."""
         union = self.confusion.sum(axis=0) + self.confusion.sum(axis=1) - np.diag(self.confusion)

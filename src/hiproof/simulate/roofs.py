@@ -185,16 +185,11 @@ def random_eave(rng: np.random.Generator) -> float:
     return float(rng.choice((2.4, 3.0, 5.5, 5.8, 8.5, 11.5)) + rng.uniform(-0.3, 0.5))
 
 
-def random_parameters(
-    rng: np.random.Generator, type: str, width: float | None = None
-) -> dict[str, float]:
+def random_parameters(rng: np.random.Generator, type: str) -> dict[str, float]:
     """Draw theta_p of one roof of `type`.
-
-    `width` (m) may be given, for parts that must fit together.
 
     The shapes' own draws keep each type apart from its neighbours in the catalogue: a hip has a
     ridge, a half-hip a gable wall worth the name, an asymmetric gable a visible difference of
     slopes or eaves.
     """
-    width = float(rng.uniform(5.0, 13.0)) if width is None else float(width)
-    return get(type).draw_parameters(rng, width)
+    return get(type).draw_parameters(rng, float(rng.uniform(5.0, 13.0)))

@@ -22,8 +22,6 @@ from .scene import (
     SOURCE_TREE,
     Defects,
     Scene,
-    building_bodies,
-    make_scene,
     random_scene,
     solids_scene,
 )
@@ -295,11 +293,6 @@ def uniform_points(
     band = rng.choice(3, size=len(xy), p=(0.90, 0.09, 0.01))
     error = (band + rng.random(len(xy))) * noise * rng.choice((-1.0, 1.0), len(xy))
     return np.column_stack([xy, building.roof.height_at(xy) + error]) + building.roof.frame.origin
-
-
-def bare_scene(building: SimBuilding) -> Scene:
-    """Return a scene of the building alone on level ground."""
-    return make_scene(building_bodies(building))
 
 
 def check_settings(settings: ScanSettings) -> ScanSettings:

@@ -15,6 +15,9 @@ from .outline import largest_polygon
 FEWEST_POINTS = 4
 """A roof plane and one point to doubt it; below that a building is a flat block."""
 
+LINE_WIDTH_M = 0.05
+"""Width (m) of a strip of points that is too narrow for a roof."""
+
 
 def usable(
     points: np.ndarray, footprint: shapely.Polygon | None
@@ -94,7 +97,7 @@ def distinct(points: np.ndarray) -> np.ndarray:
     )
 
 
-def on_a_line(xy: np.ndarray, width_m: float = 0.05) -> bool:
+def on_a_line(xy: np.ndarray) -> bool:
     """Return whether plan points (n, 2) lie in a strip too narrow for a roof."""
     across = np.linalg.svd(xy - xy.mean(axis=0), full_matrices=False)[2][-1]
-    return bool(np.ptp((xy - xy.mean(axis=0)) @ across) < width_m)
+    return bool(np.ptp((xy - xy.mean(axis=0)) @ across) < LINE_WIDTH_M)
