@@ -65,13 +65,10 @@ def run(options: Options) -> Result:
 
 NOTE = (
     "Metres, the type given. 'Missing at a corner': the given share of points nearest to one "
-    "corner, in units of the "
-    "sides; 'missing strip': a band across the ridge at a random place, not at its ends; "
-    "'outliers': so many points in "
-    "place of the roof's, anywhere in its box and up to 2 m over and under it; 'footprint': the "
-    "fit is given the true "
-    "footprint shifted that far in a random direction. RANSAC has no dimensions: the share of true "
-    "faces without a plane "
+    "corner, in units of the sides; 'missing strip': a band across the ridge at a random place, "
+    "not at its ends; 'outliers': so many points in place of the roof's, anywhere in its box and "
+    "up to 2 m over and under it; 'footprint': the fit is given the true footprint shifted that "
+    "far in a random direction. RANSAC has no dimensions: the share of true faces without a plane "
     "of their own stands for it."
 )
 

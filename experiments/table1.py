@@ -23,10 +23,8 @@ UNSEEN = 90_001
 
 REMARKS = (
     "The paper's Table 1 is on RoofN3D itself (three types, 118,073 roofs), which is not ours to "
-    "ship; its network and ours "
-    "are compared there only by whoever has the data. Always answering gable is right for 75.4 % "
-    "of RoofN3D, hence the "
-    "balanced accuracy and the recalls."
+    "ship; its network and ours are compared there only by whoever has the data. Always answering "
+    "gable is right for 75.4 % of RoofN3D, hence the balanced accuracy and the recalls."
 )
 
 

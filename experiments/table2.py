@@ -25,13 +25,10 @@ COLUMNS = (
 )
 NOTE = (
     "Metres; means over roofs of each roof's mean and standard deviation. Published: paper 0.0805 "
-    "(910 other RoofN3D roofs), "
-    "RoofN3DNet 0.162 mean, 0.088 median, 0.295 p90 (the New York roofs). The paper's objective "
-    "gets the roof's points and "
-    "type alone (its network's part), the others all points. RANSAC's surfaces are the convex "
-    "hulls of its "
-    "planes' points, as many planes as it likes, and no closed model; its PSD is that of patches, "
-    "not of buildings."
+    "(910 other RoofN3D roofs), RoofN3DNet 0.162 mean, 0.088 median, 0.295 p90 (the New York "
+    "roofs). The paper's objective gets the roof's points and type alone (its network's part), "
+    "the others all points. RANSAC's surfaces are the convex hulls of its planes' points, as many "
+    "planes as it likes, and no closed model; its PSD is that of patches, not of buildings."
 )
 UNEXPLAINED_M = 0.2
 

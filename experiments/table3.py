@@ -178,11 +178,9 @@ ERROR_COLUMNS = ("type", "paper: dim. m", "%", "transl. m") + tuple(
 )
 ERROR_NOTE = (
     "Root mean squares over all fits and parameters; % of the true value, where that is above 0.5 "
-    "m. Translation: the "
-    "centre's x and y and the top's height (the paper does not say which point; the eave's height "
-    "errs with the width). "
-    "Column 'paper' is what the paper published, 'paper:' columns with fits are its objective "
-    "written again."
+    "m. Translation: the centre's x and y and the top's height (the paper does not say which "
+    "point; the eave's height errs with the width). Column 'paper' is what the paper published, "
+    "'paper:' columns with fits are its objective written again."
 )
 
 
@@ -210,12 +208,10 @@ BOUND_COLUMNS = (
 )
 BOUND_NOTE = (
     "q0 is the height of the ridge, top or eave, q1 to q3 are slopes (and the fraction of an "
-    "asymmetric ridge, the height of "
-    "a break or hip). Their bound is Cramer and Rao's for normal errors of the same variance; that "
-    "of half_width and "
-    "half_length is the sampling limit of uniform points (experiments/cramer_rao.py). Ratios just "
-    "below 1 are chance; those of "
-    "kappa lie below because the edges tell the rotation too, which the bound leaves out."
+    "asymmetric ridge, the height of a break or hip). Their bound is Cramer and Rao's for normal "
+    "errors of the same variance; that of half_width and half_length is the sampling limit of "
+    "uniform points (experiments/cramer_rao.py). Ratios just below 1 are chance; those of kappa "
+    "lie below because the edges tell the rotation too, which the bound leaves out."
 )
 
 

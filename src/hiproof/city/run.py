@@ -239,9 +239,7 @@ def refuse_without_points(plan: WorkPlan, ledger: Ledger) -> None:
         present = ", ".join(f"{c} ({count_things(n, 'point')})" for c, n in sorted(classes.items()))
         raise InputError(
             f"expected points of building class {', '.join(map(str, building_classes))}, got "
-            "classes "
-            f"{present}; "
-            "say which class holds roofs with --building-class"
+            f"classes {present}; say which class holds roofs with --building-class"
         )
 
 

@@ -43,9 +43,7 @@ def classify_file(path: Path, out: Path, settings: Settings) -> dict[str, int]:
     if not mask.any():
         raise InputError(
             f"expected points that may be ground or buildings in {path}, got "
-            f"{len(classification):,} of "
-            "noise, water or bridges alone; "
-            "check the file's classes"
+            f"{len(classification):,} of noise, water or bridges alone; check the file's classes"
         )
     result = classify(units.to_metres(np.asarray(las.xyz)[mask]))
     las.classification[mask] = merge_classes(classification[mask], result)

@@ -71,6 +71,5 @@ def require_roofs(roofs: np.ndarray, cloud: PointCloud, why_not: str) -> np.ndar
     where = ", ".join(cloud.sources) or "the cloud"
     raise InputError(
         f"expected buildings in {where}, got {count_things(len(cloud), 'point')} {why_not}; give "
-        "--footprints, or name the class that "
-        "holds roofs with --building-class"
+        "--footprints, or name the class that holds roofs with --building-class"
     )

@@ -184,9 +184,8 @@ def select_large_groups(
     if left_out:
         warnings.warn(
             f"{count_things(left_out, 'group')} of building points left out as too small (fewer "
-            "than "
-            f"{read.split_min_points} points "
-            f"or {MIN_AREA_M2:g} m2); [read] split_min_points sets the limit",
+            f"than {read.split_min_points} points or {MIN_AREA_M2:g} m2); [read] split_min_points "
+            "sets the limit",
             InputWarning,
         )
     return large

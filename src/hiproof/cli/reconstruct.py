@@ -153,6 +153,5 @@ def parse_box(text: str) -> tuple[float, float, float, float]:
             return xmin, ymin, xmax, ymax
     raise SettingsError(
         "expected --bbox as xmin,ymin,xmax,ymax with xmin < xmax and ymin < ymax, got "
-        f"{format_value(text)}; "
-        "try --bbox 85000,446000,85500,446500"
+        f"{format_value(text)}; try --bbox 85000,446000,85500,446500"
     )

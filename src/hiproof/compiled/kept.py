@@ -98,9 +98,8 @@ def warn_not_kept() -> None:
     """Say once what it costs, and what to do."""
     warnings.warn(
         "expected a folder where compiled functions can be kept, got none that can be written "
-        "(beside the installed "
-        "package, the user's cache folder); every process compiles for minutes until "
-        "NUMBA_CACHE_DIR names one",
+        "(beside the installed package, the user's cache folder); every process compiles for "
+        "minutes until NUMBA_CACHE_DIR names one",
         NotKeptWarning,
         stacklevel=2,
     )

@@ -169,8 +169,7 @@ def polygon_soups(polygons: list[shapely.Polygon]) -> list[np.ndarray]:
     if not np.isfinite(xy).all() or np.abs(xy).max(initial=0) > MAX_EXTENT_M:
         raise CompositionError(
             "expected plan coordinates within 50 km of the roof's local origin, got larger or "
-            "non-finite ones;"
-            " give the outline in the roof's local frame"
+            "non-finite ones; give the outline in the roof's local frame"
         )
     xy = np.rint(xy / GRID_M)
     soup = np.concatenate((xy[:-1], xy[1:]), axis=1)

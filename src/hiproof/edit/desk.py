@@ -287,9 +287,8 @@ def obeyed_by(folder: Path, moved_to: Path | None = None) -> dict[str, dict[str,
     if path is None:
         warnings.warn(
             f"{folder}: the overrides that the run obeyed are gone ({overrides}): a run with "
-            f"{EDITS_FILE} "
-            "will do without them; bring them back, "
-            "or say with --clouds FOLDER where the run's files lie now",
+            f"{EDITS_FILE} will do without them; bring them back, or say with --clouds FOLDER "
+            "where the run's files lie now",
             InputWarning,
         )
         return {}

@@ -44,8 +44,7 @@ class RunFolder:
         if not self.path.is_file():
             raise InputError(
                 "expected the folder of a finished `hiproof reconstruct` or `hiproof build`, got "
-                f"{folder} without "
-                f"{PARAMETERS_FILE}; check the path"
+                f"{folder} without {PARAMETERS_FILE}; check the path"
             )
         self.stamp: tuple[int, int, int] | None = None
         self.refresh()

@@ -91,8 +91,7 @@ def run_models(folder: Path) -> Path:
     if not path.is_file():
         raise InputError(
             f"expected the output folder of `hiproof reconstruct`, got {folder} without "
-            f"{RUN_MODELS}; "
-            "give what --out named"
+            f"{RUN_MODELS}; give what --out named"
         )
     return path
 

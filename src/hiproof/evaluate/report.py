@@ -65,9 +65,8 @@ NEXT_STEPS = {
     "gone": ("building", "gone. Take them out of your map and your register."),
     "built": (
         "roof",
-        "new and without a footprint. Draw footprints over the class "
-        "<code>outside</code> of <code>changes.gpkg</code>, and update again with "
-        "<code>--footprints</code>.",
+        "new and without a footprint. Draw footprints over the class <code>outside</code> of "
+        "<code>changes.gpkg</code>, and update again with <code>--footprints</code>.",
     ),
     "extended": ("roof", "new beside a building. Extend its footprint, and update again."),
     "unmapped": (
@@ -313,9 +312,8 @@ def worst_card(run: EvaluatedRun, index: int, place: int) -> str:
     )
     text = (
         f"{escape(model.grade)} {escape(describe_type(model.roof_type))}, "
-        f"{100 * quality.share_within_20cm:.0f} % of the points "
-        "inside the outline within 0.2 m of the roof; RMSE of all, facades included, "
-        f"{quality.rmse:.2f} m"
+        f"{100 * quality.share_within_20cm:.0f} % of the points inside the outline within 0.2 m of "
+        f"the roof; RMSE of all, facades included, {quality.rmse:.2f} m"
     )
     button = f'<button type="button" data-select="{place}">{escape(model.id)}</button>'
     return f'<figure class="worst">{pictures}<figcaption>{button} {text}</figcaption></figure>'

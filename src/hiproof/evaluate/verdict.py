@@ -167,8 +167,7 @@ def cluster_findings(evidence: Evidence) -> list[Finding]:
         (
             cluster.area_m2 > POOR_CLUSTER * evidence.area_m2,
             f"{count_things(cluster.points, 'point')} up to "
-            f"{cluster.height_m:.{0 if cluster.height_m >= 10 else 1}f} m"
-            f" {doubt.value}",
+            f"{cluster.height_m:.{0 if cluster.height_m >= 10 else 1}f} m {doubt.value}",
         )
         for cluster, doubt in sides
         if cluster.points

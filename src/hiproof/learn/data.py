@@ -82,8 +82,7 @@ class Scanned:
         held_out = sum(shape.held_out for shape in self.shapes)
         return (
             f"{len(self.shapes) - held_out} real shapes of {self.path.name} under the simulated "
-            "scanner "
-            f"({held_out} held out by building), seed {self.seed}"
+            f"scanner ({held_out} held out by building), seed {self.seed}"
         )
 
     def sample(self, role: int, index: int) -> Sample:

@@ -71,7 +71,6 @@ def read_weights(network: RoofNetwork, path: str | Path) -> None:
     except Exception as error:
         raise InputError(
             f"expected {path} to hold the weights of such a network, got: "
-            f"{str(error).splitlines()[0]}; "
-            "name a file that `hiproof train` wrote for the same types, or start from random "
-            "weights"
+            f"{str(error).splitlines()[0]}; name a file that `hiproof train` wrote for the same "
+            "types, or start from random weights"
         ) from error

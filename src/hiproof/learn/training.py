@@ -83,8 +83,7 @@ def train(
     if settings.epoch < 2 * settings.views or settings.batch < 2:
         raise SettingsError(
             f"expected an epoch of at least {2 * settings.views} clouds in batches of 2 or more, "
-            f"got {settings.epoch} "
-            f"in batches of {settings.batch}"
+            f"got {settings.epoch} in batches of {settings.batch}"
         )
     source = open_source(data, settings.types, settings.seed)
     folder = writable_folder(out)
@@ -306,8 +305,7 @@ class Trainer:
         except Exception as error:
             raise InputError(
                 f"expected {path} to be a checkpoint of this training, got: "
-                f"{str(error).splitlines()[0]}; "
-                "train into another folder or remove it"
+                f"{str(error).splitlines()[0]}; train into another folder or remove it"
             ) from error
         self.epoch, self.seconds = state["epoch"], state["seconds"]
         self.history, self.best = state["history"], state["best"]
@@ -336,11 +334,9 @@ class Trainer:
         """Return progress in one line."""
         last = self.history[-1]
         return (
-            f"epoch {self.epoch}/{self.epochs}  loss "
-            f"{last['loss']:.3f}  "
-            f"balanced accuracy {last['balanced_accuracy']:.3f}  point mIoU {last['mean_iou']:.3f} "
-            " "
-            f"lowest recall {min(last['recalls'].values()):.3f}  {self.seconds / 60:.1f} min"
+            f"epoch {self.epoch}/{self.epochs}  loss {last['loss']:.3f}  balanced accuracy "
+            f"{last['balanced_accuracy']:.3f}  point mIoU {last['mean_iou']:.3f}  lowest recall "
+            f"{min(last['recalls'].values()):.3f}  {self.seconds / 60:.1f} min"
         )
 
 

@@ -141,8 +141,7 @@ class Building:
         if self.built is None:
             raise NoModelError(
                 f"expected a building with a model, got {self.id} without one "
-                f"({self.detail or self.status.value}); "
-                "`built` is None there"
+                f"({self.detail or self.status.value}); `built` is None there"
             )
         return self.built
 

@@ -116,8 +116,7 @@ def read_head(first: tuple[int, Any] | None, path: str | os.PathLike[str]) -> Fi
     if record[HEAD_KEY] != VERSION:
         raise InputError(
             f"expected parameters of version {VERSION} in {where}, got version "
-            f"{excerpt(record[HEAD_KEY])}; "
-            "use the hiproof that wrote them, or reconstruct again"
+            f"{excerpt(record[HEAD_KEY])}; use the hiproof that wrote them, or reconstruct again"
         )
     unit, offset = record.get("unit", "auto"), record.get("cityjson_offset")
     if not isinstance(unit, str) or unit not in NAMED_UNITS:
@@ -159,8 +158,7 @@ def records(
             damaged(
                 InputError(
                     f"expected a JSON object with an id in line {number} of {os.fspath(path)}, got "
-                    f"{excerpt(record)}; "
-                    "is it a parameters.jsonl that hiproof wrote?"
+                    f"{excerpt(record)}; is it a parameters.jsonl that hiproof wrote?"
                 )
             )
             record = DAMAGED

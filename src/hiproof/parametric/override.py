@@ -189,8 +189,7 @@ def refuse_contradictions(record: Mapping[str, Any], has_list: bool, where: str)
         if is_given and against:
             raise InputError(
                 f"expected {name} without {', '.join(neighbours)} in {where}, got also "
-                f"{against[0]}; "
-                "keep one"
+                f"{against[0]}; keep one"
             )
     if has_list and "origin" not in record:
         raise InputError(
@@ -208,9 +207,7 @@ def read_types(record: Mapping[str, Any], where: str) -> tuple[str, ...]:
     if names is not None and not (isinstance(names, (list, tuple)) and names):
         raise InputError(
             f"expected a list of roof types as types of {where}, got {excerpt(given_types)}; name "
-            "one "
-            "at "
-            "least"
+            "one at least"
         )
     types = tuple(name.strip() if isinstance(name, str) else name for name in names or ())
     for name in (*types, record.get("type", "flat")):

@@ -266,8 +266,7 @@ def read_grade(record: Mapping[str, Any]) -> Grade | None:
     if code and code not in by_code:
         raise InputError(
             f"expected a quality ({', '.join(by_code)}), got {code!r:.40}; leave it as the run "
-            "wrote "
-            "it"
+            "wrote it"
         )
     return by_code.get(code)
 
@@ -405,8 +404,7 @@ def refuse_other_keys(record: Mapping[str, Any], allowed: Any, label: str) -> No
     other = [str(key)[:40] for key in record if key not in allowed]
     if other:
         raise InputError(
-            f"expected the keys {', '.join(allowed)} of {label}, got also "
-            f"{', '.join(other[:8])}; "
+            f"expected the keys {', '.join(allowed)} of {label}, got also {', '.join(other[:8])}; "
             "remove them"
         )
 

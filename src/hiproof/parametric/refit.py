@@ -100,8 +100,7 @@ def refit_parts(
     if len(points) < FEWEST_REFIT_POINTS:
         raise FitError(
             f"expected {FEWEST_REFIT_POINTS} points or more inside the outline, got {len(points)}; "
-            "add a "
-            "cloud"
+            "add a cloud"
         )
     if not unknowns.names:
         return parts
@@ -137,8 +136,7 @@ def list_unknowns(parts: tuple[Part, ...], fixed: Mapping[int, Collection[str]])
         names = {*part.parameters, Z}
         if held - names:
             raise InputError(
-                f"expected parameters of part {index} ({', '.join(sorted(names))}) to hold, "
-                "got "
+                f"expected parameters of part {index} ({', '.join(sorted(names))}) to hold, got "
                 f"{', '.join(sorted(held - names))}; choose among these"
             )
         # a member's eaves are free one by one

@@ -212,8 +212,7 @@ class Primitive:
         if missing:
             raise FitError(
                 f"expected the parameters {', '.join(shape.parameters)} of the roof type "
-                f"{self.name}, got none for "
-                f"{', '.join(missing)}; give every parameter in metres"
+                f"{self.name}, got none for {', '.join(missing)}; give every parameter in metres"
             )
         return np.asarray(shape.corners(theta_p), float)
 

@@ -70,9 +70,7 @@ def refuse_other_names(
         )
         raise InputError(
             f"expected the parameters {', '.join(required) or 'width, length'} of the type {kind} "
-            "in "
-            f"{where}, got {got}; "
-            "`hiproof build --shapes` lists those of every type"
+            f"in {where}, got {got}; `hiproof build --shapes` lists those of every type"
         )
 
 

@@ -244,8 +244,7 @@ def load(weights: str, device: str = "cpu") -> LoadedNetwork:
         text = ", ".join(onnxruntime.get_available_providers())
         raise SettingsError(
             "expected a CUDA device for segment.device = 'cuda', but ONNX Runtime here offers "
-            f"only {text}; "
-            "install onnxruntime-gpu or set it to 'cpu'"
+            f"only {text}; install onnxruntime-gpu or set it to 'cpu'"
         )
     if not Path(weights).is_file():
         raise InputError(

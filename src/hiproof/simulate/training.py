@@ -52,8 +52,7 @@ def training_sample(
             return as_sample(rng, cloud, types, kind, upper)
     raise InputError(
         f"expected point counts {n_points} that a density of {density} points/m2 can reach, got "
-        f"none in {MAX_DRAWS} "
-        "buildings; widen one of them"
+        f"none in {MAX_DRAWS} buildings; widen one of them"
     )
 
 

@@ -111,7 +111,6 @@ def add_cautions(building: Building, points: np.ndarray, inner: Inner) -> Buildi
         building = add_remark(
             building,
             f"over {100 * share:.0f} % of its area {Doubt.TWO_SURFACES.value}, {apart_m:.2f} m "
-            "apart: two flights, two "
-            "dates, glass or leaves; use a cloud of one",
+            "apart: two flights, two dates, glass or leaves; use a cloud of one",
         )
     return building

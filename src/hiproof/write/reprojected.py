@@ -116,9 +116,8 @@ def choose_file_crs(crs: Any, requested: str) -> Any:
     if not plan.is_projected:
         raise InputError(
             f"expected a projected CRS for --out-crs, got {describe_crs(out)}, in which no solid "
-            "has "
-            "a size; name a UTM zone or a "
-            "national grid (`hiproof convert` to 3D Tiles places models on the globe by itself)"
+            "has a size; name a UTM zone or a national grid (`hiproof convert` to 3D Tiles places "
+            "models on the globe by itself)"
         )
     return combine(out, vertical_crs(crs)) if len(out.axis_info) < 3 else out
 
@@ -138,8 +137,7 @@ def make_reprojection(crs: Any, out: Any, source_units: Units, units: Units) -> 
     if plan is None:
         raise InputError(
             f"expected a CRS that pyproj can go to from {describe_crs(crs)}, got "
-            f"{describe_crs(out)}; "
-            "name one of the same part of the Earth"
+            f"{describe_crs(out)}; name one of the same part of the Earth"
         )
     way = height_way(crs, out) if heights else None
     return Reprojected(
@@ -165,9 +163,8 @@ def height_way(crs: Any, out: Any) -> Any:
         )
         raise InputError(
             f"expected heights that pyproj can take from {describe_crs(crs)} to "
-            f"{describe_crs(out)}, but "
-            f"{missing}; "
-            "name the plan alone with --out-crs, heights then stay as they are"
+            f"{describe_crs(out)}, but {missing}; name the plan alone with --out-crs, heights then "
+            "stay as they are"
         )
     return way
 

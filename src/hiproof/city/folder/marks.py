@@ -151,8 +151,7 @@ def hold_folder(state: Path) -> Iterator[None]:
         if error.sqlite_errorcode == sqlite3.SQLITE_BUSY:
             raise OutputError(
                 f"expected {state.parent} for this run alone, got one that another run works in; "
-                "wait for its end "
-                "(`hiproof status` shows how far it is), or choose another --out"
+                "wait for its end (`hiproof status` shows how far it is), or choose another --out"
             ) from None
         raise OutputError(
             f"expected to lock {state}, got: {error}; choose an --out that can be written, on a "

@@ -78,8 +78,7 @@ def open_ledger(state: Path, restart: bool) -> Ledger:
             ) from error
         raise OutputError(
             f"expected the ledger of a run of this version in {state}, got: {error}; begin anew "
-            "with --restart, or "
-            "choose another --out"
+            "with --restart, or choose another --out"
         ) from error
     return ledger
 
@@ -207,9 +206,8 @@ def refuse_other_inputs(out: Path, inputs: dict, ledger: Ledger) -> None:
     ]
     raise OutputError(
         f"expected {out} to be new or to hold a run of the same inputs, settings and version, got "
-        "a run that differs in "
-        f"{', '.join(other) or 'the part of an address that is masked'}; choose another --out, or "
-        "begin anew with --restart"
+        f"a run that differs in {', '.join(other) or 'the part of an address that is masked'}; "
+        "choose another --out, or begin anew with --restart"
     )
 
 
@@ -224,9 +222,8 @@ def refuse_other_operations(out: Path, plan: WorkPlan) -> None:
     if changed:
         raise OutputError(
             f"expected PROJ to transform {changed[0].subject} in {out} as before "
-            f"({changed[0].name}), got another operation: "
-            "a grid was installed or removed since; choose another --out, or begin anew with "
-            "--restart"
+            f"({changed[0].name}), got another operation: a grid was installed or removed since; "
+            "choose another --out, or begin anew with --restart"
         )
 
 

@@ -28,8 +28,7 @@ def refuse_unusable(request: Any) -> None:
     if processes is not None and not (type(processes) is int and 1 <= processes <= MOST_PROCESSES):
         raise SettingsError(
             f"expected --jobs between 1 and {MOST_PROCESSES}, got {format_value(processes)}; a "
-            "process a core "
-            "is enough, as it is without this option"
+            "process a core is enough, as it is without this option"
         )
     for name in ("layer", "where", "id_attribute", "use_attribute"):
         if getattr(request, name) is not None and request.footprints is None:

@@ -52,16 +52,13 @@ def settle_classes(clouds: tuple[str, ...], settings: Settings) -> Settings:
     if not selected_counts:
         raise InputError(
             f"expected points that may be roofs, got classes {present}, all of them ground, water, "
-            "noise, low vegetation "
-            "or bridges; say which class holds roofs with --building-class"
+            "noise, low vegetation or bridges; say which class holds roofs with --building-class"
         )
     if read.roofs == "auto":
         warnings.warn(
             f"the clouds have no building class ({', '.join(map(str, read.building_classes))}) but "
-            f"{present}: roofs are looked "
-            f"for among the points of class {', '.join(map(str, selected_counts))}; say otherwise "
-            "with "
-            "--building-class",
+            f"{present}: roofs are looked for among the points of class "
+            f"{', '.join(map(str, selected_counts))}; say otherwise with --building-class",
             InputWarning,
         )
     return choose_classes(

@@ -128,10 +128,8 @@ def warn_outside_area_of_use(headers: list[PointFileHeader], frame: AreaFrame) -
     elif abs((times := stretch(frame.crs, middles)) - 1.0) > MOST_STRETCH:
         warnings.warn(
             f"{headers[0].path}: in {describe_crs(frame.crs)} a metre on the ground is {times:.2f} "
-            "m "
-            "long there, and so are "
-            "roofs, but not their heights; reproject clouds and footprints to the UTM zone or the "
-            "national grid",
+            "m long there, and so are roofs, but not their heights; reproject clouds and "
+            "footprints to the UTM zone or the national grid",
             InputWarning,
         )
 

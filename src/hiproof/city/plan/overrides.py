@@ -161,8 +161,7 @@ def match_overrides(
         )
         warnings.warn(
             f"no building of this run for {len(remainder)} of "
-            f"{count_things(len(records), 'override')}: "
-            f"{subset}",
+            f"{count_things(len(records), 'override')}: {subset}",
             InputWarning,
         )
     return result

@@ -377,6 +377,5 @@ def refuse_box_elsewhere(bbox: Box | None, bounds: np.ndarray) -> None:
 def nothing_in(bbox: Box) -> str:
     return (
         f"expected buildings in --bbox {format_box(bbox)}, got none; it is in the coordinates of "
-        "the "
-        "clouds"
+        "the clouds"
     )

@@ -123,9 +123,8 @@ def warn_if_moved(registration: Registration, path: str) -> None:
         (x, y), sigma = registration.xy, max(registration.sigma)
         warnings.warn(
             f"{mask(path)}: all footprints lie beside their roofs and are moved by ({x:.2f}, "
-            f"{y:.2f}) m, with a standard "
-            f"deviation of {sigma:.2f} m; check the CRS of footprints and clouds, or keep them in "
-            "place with --align off",
+            f"{y:.2f}) m, with a standard deviation of {sigma:.2f} m; check the CRS of footprints "
+            "and clouds, or keep them in place with --align off",
             InputWarning,
         )
 

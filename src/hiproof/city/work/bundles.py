@@ -296,8 +296,7 @@ def load_bundle(
     ) as error:
         raise InputError(
             f"expected a folder that a run kept of a failed building at {folder}, got: {error}; it "
-            "lies in the run's "
-            f"folder {FAILURES_FOLDER}"
+            f"lies in the run's folder {FAILURES_FOLDER}"
         ) from error
     settings = Settings.from_toml(folder / "settings.toml")
     # the outline lies where the run had moved it

@@ -132,8 +132,7 @@ class Dask:
             count = 0 if self.client.nthreads() else count + POLL_S
         raise OutputError(
             f"expected workers at the Dask scheduler {self.address}, got none for {WORKERLESS_S} "
-            "s; start some, the same "
-            "command then goes on from here"
+            "s; start some, the same command then goes on from here"
         )
 
     def outcome(self, future: Any) -> tuple[Any, Exception | None]:

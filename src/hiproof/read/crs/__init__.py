@@ -226,9 +226,8 @@ def find_units(crs: CRS | None, source: str = "the point clouds", unit_name: str
     if plan.is_geographic or plan.is_geocentric:
         raise InputError(
             f"expected {source} in a projected CRS, got {crs.name} in "
-            f"{'degrees' if plan.is_geographic else 'geocentric coordinates'}; "
-            "reproject it first, to the UTM zone or the national grid of the place (`pdal "
-            "translate`, `ogr2ogr`)"
+            f"{'degrees' if plan.is_geographic else 'geocentric coordinates'}; reproject it first, "
+            "to the UTM zone or the national grid of the place (`pdal translate`, `ogr2ogr`)"
         )
     check_plan_axes(plan, source)
     across = plan.axis_info[0]
@@ -243,8 +242,7 @@ def find_units(crs: CRS | None, source: str = "the point clouds", unit_name: str
     if unit_name != "auto" and abs(NAMED_UNITS[unit_name].plan / units.plan - 1) > 1e-9:
         raise InputError(
             f"expected {source} in {unit_name}, as --unit says, got {crs.name} in {units}; leave "
-            "--unit out, "
-            "or say with --crs which CRS is right"
+            "--unit out, or say with --crs which CRS is right"
         )
     return units
 
@@ -267,8 +265,7 @@ def find_height_units(heights: CRS, source: str, unit_name: str) -> Units:
     if abs(vertical.unit_conversion_factor / units.plan - 1) > 1e-9:
         raise InputError(
             f"expected {source} in a CRS of the plan, got {heights.name}, which names heights "
-            f"alone, in {vertical.unit_name}; "
-            "name both with --crs, such as EPSG:28992+5709"
+            f"alone, in {vertical.unit_name}; name both with --crs, such as EPSG:28992+5709"
         )
     return units
 
@@ -328,9 +325,7 @@ def make_transformer(source: CRS, target: CRS) -> Transformer:
     except ProjError as error:
         raise InputError(
             f"expected a way from {describe_crs(source)} to {describe_crs(target)}, got none that "
-            "PROJ "
-            "knows; "
-            "check which CRS each file names, or reproject one of them"
+            "PROJ knows; check which CRS each file names, or reproject one of them"
         ) from error
 
 

@@ -55,15 +55,13 @@ def check_plan_axes(plan: Any, source: str) -> None:
     if len(directions) < 2:
         raise InputError(
             f"expected {source} in a CRS of two axes in plan, got {plan.name} "
-            f"({plan.type_name.lower()}); "
-            "name a projected CRS with --crs"
+            f"({plan.type_name.lower()}); name a projected CRS with --crs"
         )
     if not runs_east_and_north(directions, is_local=plan.is_engineering):
         raise InputError(
             f"expected {source} in a CRS whose axes run east and north, got {plan.name}, whose "
-            "axes run "
-            f"{' and '.join(directions)}; reproject to a CRS of the place that counts east and "
-            "north"
+            f"axes run {' and '.join(directions)}; reproject to a CRS of the place that counts "
+            "east and north"
         )
     for axis in plan.axis_info[:2]:
         check_unit(axis, plan, source)
@@ -71,8 +69,7 @@ def check_plan_axes(plan: Any, source: str) -> None:
     if first.unit_conversion_factor != second.unit_conversion_factor:
         raise InputError(
             f"expected {source} in a CRS with one unit in plan, got {plan.name} in "
-            f"{first.unit_name} and "
-            f"{second.unit_name}; reproject to a CRS with one unit"
+            f"{first.unit_name} and {second.unit_name}; reproject to a CRS with one unit"
         )
 
 
@@ -114,7 +111,6 @@ def check_unit(axis: Any, crs: Any, source: str) -> None:
     if is_angle or not LEAST_UNIT_M <= axis.unit_conversion_factor <= MOST_UNIT_M:
         raise InputError(
             f"expected {source} in a CRS that counts in metres, feet or another unit of length, "
-            f"got {crs.name} in "
-            f"units of {axis.unit_conversion_factor:g} ({axis.unit_name}); name the right CRS with "
-            "--crs"
+            f"got {crs.name} in units of {axis.unit_conversion_factor:g} ({axis.unit_name}); name "
+            "the right CRS with --crs"
         )

@@ -76,8 +76,7 @@ class Operation:
         )
         return (
             f"{text}; a better way{better} needs {', '.join(self.missing_grids)}, which is not "
-            "installed: "
-            f"run `projsync {files}`, or set PROJ_NETWORK=ON"
+            f"installed: run `projsync {files}`, or set PROJ_NETWORK=ON"
         )
 
     def to_dict(self) -> dict[str, Any]:

@@ -58,8 +58,7 @@ def refuse_degrees(boxes: np.ndarray, subject: str, advice: str) -> None:
     if len(boxes) and degrees and np.median((upper - lower).max(axis=1)) < DEGREES_WIDE:
         raise InputError(
             f"expected {subject} in metres, got coordinates in {extent(lower, upper)}, which look "
-            "like "
-            f"degrees; {advice}"
+            f"like degrees; {advice}"
         )
 
 

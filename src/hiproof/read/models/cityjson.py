@@ -76,8 +76,7 @@ def features(
         except UNUSABLE as error:
             damage = InputError(
                 f"expected CityJSON that can be read in {place}, got {explain_error(error)}; mend "
-                "it "
-                "there"
+                "it there"
             )
             (refuse if document["type"] == "CityJSON" else damaged)(damage)
             yield Feature({}, np.empty((0, 3)), place, units, True)
@@ -124,9 +123,7 @@ def unusable(id: str, feature: Feature, error: Exception) -> InputError:
     )
     return InputError(
         f"expected {place} to be one that can be used, got {explain_error(error)}; mend it there, "
-        "or "
-        "make the file anew with "
-        "`hiproof build`"
+        "or make the file anew with `hiproof build`"
     )
 
 
@@ -184,8 +181,7 @@ def parsed_line(line: str, place: str, seen_header: bool) -> dict[str, Any]:
     if kind != "CityJSON" and not (seen_header and kind == "CityJSONFeature"):
         raise InputError(
             "expected a CityJSON line followed by CityJSONFeatures, got one of type "
-            f"{excerpt(kind)} in {place}; is this another "
-            "kind of JSON?"
+            f"{excerpt(kind)} in {place}; is this another kind of JSON?"
         )
     return document
 

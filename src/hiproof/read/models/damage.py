@@ -59,9 +59,8 @@ class SkippedBuildings:
         if self.count and all(are_damaged):
             raise InputError(
                 "expected a building that can be read, got "
-                f"{count_things(self.count, 'damaged one')} "
-                "and no other; "
-                "make the files anew with `hiproof build` or `hiproof reconstruct`"
+                f"{count_things(self.count, 'damaged one')} and no other; make the files anew with "
+                "`hiproof build` or `hiproof reconstruct`"
             )
 
     @property

@@ -300,8 +300,7 @@ def gml_shells(solid: Any, polygons: dict[str | None, Any], place: str) -> list[
                 if reference.lstrip("#") not in polygons:
                     raise InputError(
                         f"expected a polygon with id {reference} among the surfaces of {place}, "
-                        "got none;"
-                        " the solid refers to a surface that is missing"
+                        "got none; the solid refers to a surface that is missing"
                     )
                 members.append(polygons[reference.lstrip("#")])
             elif local_name(element) == "Polygon":

@@ -80,8 +80,7 @@ def find_crs(srids: set[int], table: str) -> str | None:
     if len(known_srids) > 1:
         raise InputError(
             f"expected one reference system in {table}, got SRIDs {sorted(known_srids)}; choose "
-            "rows "
-            "with &where="
+            "rows with &where="
         )
     return f"EPSG:{known_srids.pop()}" if known_srids else None
 

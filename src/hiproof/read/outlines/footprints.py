@@ -301,8 +301,7 @@ def feature_ids(
         if missing:
             warnings.warn(
                 f"{path}: {count_things(missing, 'feature')} without {name}; the number stands in "
-                "for "
-                "it",
+                "for it",
                 InputWarning,
             )
         return [id or number for id, number in zip(ids, by_number, strict=True)]
@@ -366,8 +365,7 @@ def transform_geometries(
     if not np.isfinite(shapely.get_coordinates(moved)).any():
         raise InputError(
             f"expected footprints of {path} that can be moved from {source.name} to the cloud's "
-            f"{target.name}, got "
-            f"coordinates outside that system; {advise(source)}"
+            f"{target.name}, got coordinates outside that system; {advise(source)}"
         )
     return moved
 
@@ -442,8 +440,7 @@ def split_features(
     if empty:
         warnings.warn(
             f"{path}: {count_things(empty, 'feature')} with no area that a building could have; "
-            "such "
-            "get no model, but a status",
+            "such get no model, but a status",
             InputWarning,
         )
     return footprints
@@ -472,8 +469,7 @@ def unique_ids(footprints: Sequence[Footprint], path: str | Path) -> list[Footpr
     if renamed:
         warnings.warn(
             f"{path}: {count_things(renamed, 'footprint')} with the id of an earlier one got a "
-            "suffix "
-            "such as _2",
+            "suffix such as _2",
             InputWarning,
         )
     if copies:
@@ -522,7 +518,6 @@ def warn_overlaps(footprints: Sequence[Footprint], path: str | Path) -> None:
         warnings.warn(
             f"{path}: {count_things(len(np.unique(smaller)), 'footprint')} on top of a larger one "
             f"({footprints[smaller[0]].id} on {footprints[larger[0]].id}): models of both have the "
-            "same points and overlap; "
-            "keep one of them",
+            "same points and overlap; keep one of them",
             InputWarning,
         )

@@ -232,8 +232,7 @@ def choose_layer(path: str | Path, layer: str | int | None) -> str | int | None:
     if len(layers) > 1:
         raise InputError(
             f"expected one layer of footprints in {path}, got {len(layers)}: "
-            f"{', '.join(map(str, layers))}; "
-            "name one with --layer"
+            f"{', '.join(map(str, layers))}; name one with --layer"
         )
     return layers[0] if layers else None
 
@@ -274,6 +273,5 @@ def unreadable(path: str | Path, error: Exception) -> InputError:
     reason = str(error).partition("; It might help")[0].rstrip(".")
     return InputError(
         f"expected a vector file that GDAL reads (GeoPackage, GeoJSON, Shapefile, ...) at {path}, "
-        f"got: {reason}; "
-        "check the file, or convert it with ogr2ogr"
+        f"got: {reason}; check the file, or convert it with ogr2ogr"
     )

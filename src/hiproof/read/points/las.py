@@ -173,9 +173,8 @@ def translate_errors(path: str | Path) -> Iterator[None]:
         reason = str(error) or type(error).__name__
         raise InputError(
             f"expected a complete LAS, LAZ or COPC file at {path}, got one that cannot be decoded "
-            f"({reason}); "
-            "it may be truncated: copy or download it again, and compare its size with the "
-            "original's"
+            f"({reason}); it may be truncated: copy or download it again, and compare its size "
+            "with the original's"
         ) from error
 
 

@@ -166,8 +166,7 @@ def check_layout(facts: LasFacts) -> None:
     if not HEADER_BYTES[facts.minor] <= facts.header_bytes <= facts.data_start <= facts.points_end:
         raise Implausible(
             f"its header of {facts.header_bytes} bytes tells of points from byte "
-            f"{facts.data_start} "
-            f"to {facts.points_end}; it is truncated or damaged"
+            f"{facts.data_start} to {facts.points_end}; it is truncated or damaged"
         )
     if (
         facts.point_format >= len(RECORD_BYTES)
@@ -316,10 +315,8 @@ def check_coordinates(facts: LasFacts) -> None:
     if not (ordered & reached).all():
         raise Implausible(
             f"its header's bounds ({format_list(facts.mins)}) to ({format_list(facts.maxs)}) "
-            "cannot be those "
-            "of coordinates "
-            f"with the offset ({format_list(facts.offsets)}) and the scale "
-            f"({format_list(facts.scales)})"
+            f"cannot be those of coordinates with the offset ({format_list(facts.offsets)}) and "
+            f"the scale ({format_list(facts.scales)})"
         )
 
 
@@ -395,10 +392,8 @@ def check_points(xyz: np.ndarray, facts: LasFacts) -> tuple[np.ndarray, np.ndarr
     if not ((lower >= facts.mins - facts.rounding) & (upper <= facts.maxs + facts.rounding)).all():
         raise Implausible(
             f"it has points from ({format_list(lower)}) to ({format_list(upper)}), outside its "
-            "header's bounds "
-            f"({format_list(facts.mins)}) to ({format_list(facts.maxs)}); its header or its points "
-            "are "
-            "damaged"
+            f"header's bounds ({format_list(facts.mins)}) to ({format_list(facts.maxs)}); its "
+            "header or its points are damaged"
         )
     return lower, upper
 
@@ -411,10 +406,8 @@ def check_all_points(lower: np.ndarray, upper: np.ndarray, facts: LasFacts) -> N
     if not ((lower <= facts.mins + SHORT) & (upper >= facts.maxs - SHORT)).all():
         raise Implausible(
             f"its points reach from ({format_list(lower)}) to ({format_list(upper)}), its header's "
-            "bounds from "
-            f"({format_list(facts.mins)}) to ({format_list(facts.maxs)}); its scale, its count or "
-            "its bounds "
-            "are wrong"
+            f"bounds from ({format_list(facts.mins)}) to ({format_list(facts.maxs)}); its scale, "
+            "its count or its bounds are wrong"
         )
 
 

@@ -67,9 +67,8 @@ def refuse_missing_bytes(file: BinaryIO, layout: PlyLayout, path: str | Path) ->
     if layout.count * count > end - start:
         raise InputError(
             f"expected {count_things(layout.count, 'vertex', 'vertices')} in {path} as its header "
-            "says, "
-            f"got {end - start} bytes of them; "
-            "the file is truncated: copy or download it again"
+            f"says, got {end - start} bytes of them; the file is truncated: copy or download it "
+            "again"
         )
 
 
@@ -99,9 +98,7 @@ def read_vertices(
     if result < count:
         raise InputError(
             f"expected {count_things(layout.count, 'vertex', 'vertices')} in {path} as its header "
-            "says, "
-            f"got {read + result}; "
-            "the file is truncated: copy or download it again"
+            f"says, got {read + result}; the file is truncated: copy or download it again"
         )
     return table
 
@@ -149,6 +146,5 @@ def header_lines(file: BinaryIO, path: str | Path) -> Iterator[list[str]]:
 def unreadable(path: str | Path, got: str) -> InputError:
     return InputError(
         f"expected a PLY file whose first element is the vertices with scalar x, y, z in {path}, "
-        f"got {got}; "
-        "export the points alone, or write them as LAZ"
+        f"got {got}; export the points alone, or write them as LAZ"
     )

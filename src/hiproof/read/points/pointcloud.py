@@ -215,8 +215,7 @@ def refuse_implausible(xyz: np.ndarray, path: str | Path) -> None:
         point = ", ".join(f"{value:g}" for value in xyz[np.argmax(mask)])
         raise InputError(
             f"expected coordinates up to {MOST_PLAN:g} and heights up to {MOST_HEIGHT:g} in "
-            f"{path}, got the point {point}; "
-            "put it right or leave it out"
+            f"{path}, got the point {point}; put it right or leave it out"
         )
 
 
@@ -296,8 +295,7 @@ def warn_coarse(headers: list[PointFileHeader], units: Units) -> None:
         path, steps = next(iter(coarse.items()))
         warnings.warn(
             f"{path}{format_others(list(coarse))}: coordinates come in steps of {steps}, and roofs "
-            "are no finer; "
-            "write the file anew from its source with steps of 0.01 m or less",
+            "are no finer; write the file anew from its source with steps of 0.01 m or less",
             InputWarning,
         )
 
@@ -438,8 +436,7 @@ def common_crs(crs_of: dict[str, Any], arguments: Any = None, unit: str = "auto"
         if overruled:
             warnings.warn(
                 f"{overruled[0]}{format_others(overruled)}: taken in {describe_crs(arguments)}, as "
-                "told, "
-                f"although its header names {describe_crs(named_crs[overruled[0]])}",
+                f"told, although its header names {describe_crs(named_crs[overruled[0]])}",
                 InputWarning,
             )
         return arguments
@@ -450,8 +447,7 @@ def common_crs(crs_of: dict[str, Any], arguments: Any = None, unit: str = "auto"
     if named_crs and unnamed:
         warnings.warn(
             f"{unnamed[0]}{format_others(unnamed)}: names no CRS; taken in "
-            f"{describe_crs(named_crs[first])} "
-            f"as {first} is",
+            f"{describe_crs(named_crs[first])} as {first} is",
             InputWarning,
         )
     return max(named_crs.values(), key=lambda crs: vertical_crs(crs) is not None, default=None)
@@ -466,8 +462,7 @@ def refuse_unknown(crs_of: dict[str, Any]) -> None:
         if isinstance(crs, UnknownCRS):
             raise InputError(
                 f"expected a coordinate reference system that PROJ understands in {path}, got "
-                f"{crs.reason}; "
-                "name the right one with --crs, or its unit alone with --unit"
+                f"{crs.reason}; name the right one with --crs, or its unit alone with --unit"
             )
 
 
@@ -487,9 +482,8 @@ def refuse_two(first: Any, first_source: str, second: Any, second_source: str) -
     if first != second and not (same_horizontal(first, second) and same_heights(first, second)):
         raise InputError(
             f"expected all clouds in one CRS, got {describe_crs(first)} in {first_source} and "
-            f"{describe_crs(second)} in "
-            f"{second_source}; reproject one of them, or say with --crs which is right where a "
-            "header is wrong"
+            f"{describe_crs(second)} in {second_source}; reproject one of them, or say with --crs "
+            "which is right where a header is wrong"
         )
 
 

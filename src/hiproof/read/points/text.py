@@ -73,9 +73,8 @@ def parse_rows(file, layout: TextLayout, count: int, path: str | Path, read: int
     except (ValueError, IndexError) as error:
         raise InputError(
             f"expected three numbers x y z on every line of {path}, got another after "
-            f"{count_things(read, 'point')} ({error}); "
-            "write one point a line with a decimal point, the columns separated by blanks, commas, "
-            "semicolons or tabs"
+            f"{count_things(read, 'point')} ({error}); write one point a line with a decimal "
+            "point, the columns separated by blanks, commas, semicolons or tabs"
         ) from error
 
 
@@ -99,8 +98,7 @@ def sniff(path: str | Path) -> TextLayout:
     if head[:16].lstrip().lower().startswith(b"ncols"):
         raise InputError(
             f"expected lines of x y z in {path}, got an ESRI ASCII grid; convert a surface model "
-            "to points (`gdal2xyz`), "
-            "or name a model of the ground with --terrain"
+            "to points (`gdal2xyz`), or name a model of the ground with --terrain"
         )
     if b"\0" in head:
         raise InputError(

@@ -65,8 +65,7 @@ def refuse_without_position(dataset: Any, path: str) -> None:
     ):
         raise InputError(
             f"expected a raster whose pixels have an area at {path}, got the geotransform "
-            f"{tuple(transform[:6])}; "
-            "export it again with its position"
+            f"{tuple(transform[:6])}; export it again with its position"
         )
 
 
@@ -120,8 +119,7 @@ def read_scaling(dataset: Any, band: int, path: str) -> tuple[float, float]:
     if not (math.isfinite(scale) and scale and math.isfinite(offset)):
         raise InputError(
             f"expected a scale and an offset of the heights at {path}, got {scale:g} and "
-            f"{offset:g}; "
-            "correct them (`gdal_edit -scale 1 -offset 0`)"
+            f"{offset:g}; correct them (`gdal_edit -scale 1 -offset 0`)"
         )
     return scale, offset
 
@@ -142,8 +140,7 @@ def band_unit(name: str | None, path: str) -> float | None:
             return None
     raise InputError(
         f"expected heights in metres or feet at {path}, got a band in {name!r}; convert them to "
-        "metres "
-        "(`gdal_calc`), or correct the unit"
+        "metres (`gdal_calc`), or correct the unit"
     )
 
 

@@ -119,8 +119,7 @@ def load_tables(
     if not TABLE_PREFIX.fullmatch(run.prefix):
         raise InputError(
             "expected a table prefix of at most 48 letters (a to z), digits and underscores, got "
-            f"{run.prefix!r:.80}; "
-            "choose another --prefix"
+            f"{run.prefix!r:.80}; choose another --prefix"
         )
     psycopg = import_psycopg()
     with ExitStack() as stack:

@@ -163,10 +163,8 @@ def explain_heights(crs: Any, exact: Any, geoid_height_m: float | None) -> tuple
         )
     return (
         f"pyproj has no grid here for {height_crs.name}, so heights are taken to be above the "
-        "ellipsoid "
-        "and the buildings may "
-        "stand some tens of metres too low or high; install it (`projsync`, or PROJ_NETWORK=ON) "
-        f"or {advice}"
+        "ellipsoid and the buildings may stand some tens of metres too low or high; install it "
+        f"(`projsync`, or PROJ_NETWORK=ON) or {advice}"
     ), False
 
 
