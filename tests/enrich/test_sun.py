@@ -9,7 +9,7 @@ from click.testing import CliRunner
 from hiproof.cli.app import app
 from hiproof.enrich.answer import answer
 from hiproof.enrich.cadastre import Cadastre, locate, measure_panels
-from hiproof.enrich.horizon import SECTORS, find_horizon, measure_share
+from hiproof.enrich.far import SECTORS, find_horizon, measure_share
 from hiproof.enrich.run import enrich_run
 from hiproof.enrich.sun import irradiate, make_sky, measure_sky, sample_face
 from hiproof.enrich.walls import area_vectors, measure_faces

@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from hiproof.errors import InputError
-from hiproof.learn.data import CURVED_TYPES, open_source
+from hiproof.learn.data import CURVED_TYPES, open_source, read_shapes
 from hiproof.learn.houses import lengthen, resize, training_house, without_a_corner
 from hiproof.learn.sample import TEST, TRAINING, VALIDATION
-from hiproof.learn.shapes import read_shapes
 from hiproof.simulate import ROOF_TYPES
 from hiproof.simulate.roofs import random_building
 

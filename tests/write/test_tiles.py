@@ -19,7 +19,7 @@ from hiproof.read.crs import find_units
 from hiproof.write.colours import linear_rgb, type_colour
 from hiproof.write.meshes.tiles import Globe, write_models
 from hiproof.write.meshes.tiles.properties import NO_NUMBER, Found
-from hiproof.write.meshes.tiles.quadtree import quadtree
+from hiproof.write.meshes.tiles.tileset import quadtree
 from hiproof.write.meshes.viewed import ViewedModel
 from hiproof.write.naming import FileUnits
 from sample_models import ORIGIN, courtyard_solid, gable_solid, two_parts

@@ -17,8 +17,7 @@ from ..settings import EnrichSettings
 from ..write.attribute_list import OWN
 from ..write.head import FileHead
 from ..write.values import round_value
-from .far import TerrainHorizon, open_terrain, read_horizon
-from .horizon import SECTORS
+from .far import SECTORS, TerrainHorizon, open_terrain, read_horizon
 from .party import Town
 from .records import MOST_KEPT, Records
 from .sun import Irradiation, Sky, irradiate, make_sky, sample_face, sample_wall

@@ -1,4 +1,7 @@
-"""The far horizon: that of a terrain model, and that of a file as PVGIS has it."""
+"""The horizon around places: of buildings, of a terrain model, and of a file as PVGIS has it.
+
+A ray in the middle of each of SECTORS sectors is compared with the edges of roofs.
+"""
 
 from __future__ import annotations
 
@@ -9,13 +12,15 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
+from ..geometry.grid import expand
 from ..read.crs import find_units, parse_crs
 from ..read.terrain import read_terrain
 from ..read.terrain.raster import RasterTerrain
-from .horizon import SECTORS
 from .records import Records
 from .weather import EARTH_RADIUS_KM
 
+SECTORS = 180  # directions of rays around a place, 2 degrees apart
+LIFT_M = 0.01  # height (m) of a place over its roof, so that rounding does not hide it
 MIDDLES_DEG = (np.arange(SECTORS) + 0.5) * (360.0 / SECTORS)
 TERRAIN_REACH_M = (
     20_000.0  # distance (m) up to which terrain shades: 350 m of height rise 1 degree there
@@ -132,3 +137,46 @@ def find_known_box(terrain: RasterTerrain, boxes: np.ndarray) -> tuple[np.ndarra
         np.maximum(places.min(axis=0) - step, low),
         np.minimum(places.max(axis=0) + step, high),
     )
+
+
+def find_horizon(places: np.ndarray, edges: np.ndarray) -> np.ndarray:
+    """Return the tangents (n, SECTORS) of the horizon around `places` (n, 3).
+
+    `edges` (m, 2, 3) are edges of roofs. Sector 0 begins in the north, and sectors follow
+    clockwise. The horizon is nowhere below level.
+
+    >>> wall = np.array([[[-50.0, 10.0, 5.0], [50.0, 10.0, 5.0]]])
+    >>> horizon = find_horizon(np.zeros((1, 3)), wall)
+    >>> round(float(horizon[0, 0]), 3), float(horizon[0, 90])
+    (0.5, 0.0)
+    """
+    width = 2 * np.pi / SECTORS
+    horizon = np.zeros((len(places), SECTORS))
+    ends = edges - places[:, None, None]
+    place, edge = np.nonzero(ends[:, :, :, 2].max(axis=2) > 0.0)
+    a, b = ends[place, edge].swapaxes(0, 1)
+    first, last = (np.arctan2(end[:, 0], end[:, 1]) for end in (a, b))
+    turn = (last - first + np.pi) % (2 * np.pi) - np.pi
+    low = np.minimum(first, first + turn)
+    start = np.ceil(low / width - 0.5).astype(np.int64)
+    end = np.floor((low + np.abs(turn)) / width - 0.5).astype(np.int64)
+    # one row for each edge and each ray that crosses it
+    row, step = expand(np.maximum(end - start + 1, 0))
+    sector = (start[row] + step) % SECTORS
+    angle = (sector + 0.5) * width
+    ray, a, way = np.array([np.sin(angle), np.cos(angle)]), a[row].T, (b - a)[row].T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = (ray[1] * a[0] - ray[0] * a[1]) / (ray[0] * way[1] - ray[1] * way[0])
+        distance = (ray * (a[:2] + share * way[:2])).sum(axis=0)
+        rise = (a[2] + share * way[2]) / distance
+    ahead = distance > 1e-6
+    np.maximum.at(horizon, (place[row][ahead], sector[ahead]), rise[ahead])
+    return horizon
+
+
+def measure_share(horizon: np.ndarray, sector: np.ndarray, tangent: np.ndarray) -> np.ndarray:
+    """Return the share (t,) of places that see each sun position.
+
+    Positions lie in `sector` (t,) at elevations of `tangent` (t,).
+    """
+    return (tangent > horizon[:, sector]).mean(axis=0)

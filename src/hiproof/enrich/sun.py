@@ -16,7 +16,7 @@ import numpy as np
 import shapely
 
 from ..model import Solid
-from .horizon import LIFT_M, SECTORS, find_horizon, measure_share
+from .far import LIFT_M, SECTORS, find_horizon, measure_share
 from .walls import Wall
 from .weather import import_pvlib, make_clear_sky, read_weather
 

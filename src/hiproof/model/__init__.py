@@ -6,23 +6,21 @@ inputs      point clouds and footprints
 roof        pieces, parts, roofs: a roof is a max of mins of planes
 solid       faces, solids
 installation  objects on a roof
-underside   how a solid ends below: terrain, passages
 overhang    how far a roof reaches beyond its walls
 fit         one primitive fitted to points
-building    models and buildings
+building    models and buildings; how a solid ends below: terrain, passages
 shown       where each part of a roof shows from above
 heights     heights of roofs at many points
 roof_figures  heights, slopes, ridge and volume of a solid
 """
 
-from .building import Building, Model, Quality
+from .building import ONE_LEVEL, Building, Model, Passage, Quality, Underside
 from .fit import Fit
 from .inputs import Footprint, PointCloud, as_xyz
 from .installation import Installation
 from .overhang import Eaves, Overhang
 from .roof import Part, Piece, Roof
 from .solid import CEILING, GROUND, ROOF, WALL, Face, Solid
-from .underside import ONE_LEVEL, Passage, Underside
 
 __all__ = [
     "CEILING",

@@ -19,7 +19,36 @@ from .overhang import Eaves
 from .roof import Part, Roof
 from .shown import compute_visible_pieces, measure_visible_pieces, unite_visible_pieces
 from .solid import Solid
-from .underside import ONE_LEVEL, Underside
+
+
+@dataclass(frozen=True)
+class Passage:
+    """A passage under a building, open below its `ceiling` over its `outline`.
+
+    Both are in the roof's frame, in metres.
+    """
+
+    outline: shapely.Polygon
+    ceiling: float
+
+
+@dataclass(frozen=True)
+class Underside:
+    """The lower end of a solid.
+
+    `terrain` holds closed lines (m, 3) along the outline down to which walls reach, in the roof's
+    frame; without lines the solid stands on one level. `passages` lead through below it.
+    """
+
+    terrain: tuple[np.ndarray, ...] = ()
+    passages: tuple[Passage, ...] = ()
+
+    @property
+    def is_level(self) -> bool:
+        return not (self.terrain or self.passages)
+
+
+ONE_LEVEL = Underside()
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,7 @@ dates      when the new points were surveyed, and surveys as the user names them
 members    the buildings of an update: earlier ones, and those of new footprints
 plan       the plan of the update, from the earlier buildings
 register   the common shift between the two surveys
-residuals  heights of points over the earlier roof
-cells      both surveys compared in cells of a metre
+cells      heights of points over the earlier roof, and both surveys compared in cells of a metre
 clusters   connected cells that contradict the earlier roof, and how likely chance makes them
 judge      the class of a building: unchanged, changed, gone, ...
 kinds      what changed: a part raised, a dormer built, ...

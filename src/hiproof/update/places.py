@@ -17,9 +17,9 @@ from ..model import Building, Roof
 from ..parametric.building import build
 from ..status import ChangeKind, Status
 from ..write.parameters import outline_record
+from .cells import measure_residuals
 from .judge import OVER_GROUND_M, ChangeVerdict
 from .kinds import Difference
-from .residuals import measure_residuals
 
 DIFFERENCE_DIGITS = 4  # of differences: tenths of a millimetre
 PLACE_DIGITS = 3  # of the outlines of places: millimetres

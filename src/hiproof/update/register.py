@@ -25,9 +25,15 @@ from ..city.plan.work_plan import WorkPlan
 from ..errors import InputWarning, SettingsError
 from ..model import Roof
 from ..settings import ReadSettings
-from .cells import SurveyNoise, compare_points, select_inner, shrink_outline
+from .cells import (
+    SurveyNoise,
+    compare_points,
+    find_slopes,
+    measure_residuals,
+    select_inner,
+    shrink_outline,
+)
 from .clusters import flag_cells
-from .residuals import find_slopes, measure_residuals
 
 MOST_POINTS = 400
 """Points of a building that are used: more tell the roof's own errors rather than the shift."""
