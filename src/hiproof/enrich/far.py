@@ -1,6 +1,8 @@
 """The horizon around places: of buildings, of a terrain model, and of a file as PVGIS has it.
 
-A ray in the middle of each of SECTORS sectors is compared with the edges of roofs.
+Models have upright walls and nothing below their roofs, so whatever lies under a roof's edge is
+dark: a ray from a place is free where it passes over every roof edge that it crosses in plan. One
+ray is cast in the middle of each of SECTORS directions, and the horizon there is exact.
 """
 
 from __future__ import annotations

@@ -2,7 +2,9 @@
 
 Each cell has the median height over the earlier roof of either survey. Their difference has
 a standard deviation that follows from the scatter of the points in the cell, from their number, and
-from how much unchanged roofs differ, cell by cell and as a whole. Heights over a roof do not regard where exactly its steps lie.
+from how much unchanged roofs differ, cell by cell and as a whole.
+
+Heights over a roof do not regard where exactly its steps lie.
 """
 
 from __future__ import annotations
