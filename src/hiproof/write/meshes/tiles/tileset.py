@@ -241,6 +241,7 @@ def whole_folder(folder: Path) -> Iterator[Path]:
         for remainder in (name, older):
             remove(remainder)
 
+
 @dataclass(frozen=True)
 class Tile:
     """A tile: its `name`, and the `items` (k,) that it draws.
