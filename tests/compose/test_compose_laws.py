@@ -1,16 +1,24 @@
 """Laws every composed solid keeps, over generated roofs that hold everything that makes composing
-hard.
+hard, over planes and outlines, and over roofs that once did not become a solid (tests/regressions).
 """
+
+import json
+from pathlib import Path
 
 import numpy as np
 import pytest
 import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 
 import roof_zoo
 from hiproof.compose import check_solid, compose, terrain_intersection
+from hiproof.compose.cells import equal_planes
+from hiproof.compose.settle import settle_outlines
 from hiproof.model import Part, Piece, Roof, Solid
 from hiproof.settings import Settings
-from roof_zoo import KINDS, generate_roof, move_roof
+from roof_zoo import FRAME, KINDS, generate_roof, move_roof
 
 Z_GROUND = -2.0
 # random roofs are full of faces thinner than a person draws, which by default join a neighbour:
@@ -281,3 +289,58 @@ def test_terrain_intersection_follows_the_terrain_around_every_ring():
 def test_terrain_that_knows_nothing_leaves_the_floor():
     (line,) = terrain_intersection(HOUSE, lambda xy: np.full(len(xy), np.nan), -1.5)
     assert (line[:, 2] == -1.5).all()
+
+
+NUMBERS = st.sampled_from([0.0, 0.5, 0.5 + 6e-7, 0.5 + 2e-6, 4.0])
+
+
+@given(arrays(float, st.tuples(st.integers(1, 12), st.just(3)), elements=NUMBERS))
+def test_each_plane_has_the_number_of_the_first_that_equals_it(planes):
+    is_equal = (np.abs(planes[:, None] - planes) < 1e-6).all(axis=2)
+    assert equal_planes(planes).tolist() == is_equal.argmax(axis=1).tolist()
+
+
+GRID_M = 1e-4
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_outlines_that_cross_themselves_become_valid_ones_of_the_same_area(seed):
+    rng = np.random.default_rng(seed)
+    angle = np.sort(rng.uniform(0, 2 * np.pi, 9))
+    ring = rng.uniform(2, 6, 9)[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+    # a spike out and back that is narrower than the grid
+    spike = 0.5 * (ring[0] + ring[1]) + rng.normal(0, 2.0, 2)
+    ring = np.insert(ring, 1, [ring[0], spike, ring[0] + rng.normal(0, 0.4 * GRID_M, 2)], axis=0)
+    outline = shapely.Polygon(ring)
+    polygons = settle_outlines([outline])
+    assert all(polygon.is_valid and polygon.geom_type == "Polygon" for polygon in polygons)
+    area = shapely.make_valid(outline, method="structure", keep_collapsed=False).area
+    assert abs(sum(polygon.area for polygon in polygons) - area) < 40 * GRID_M
+    assert [p.wkb for p in settle_outlines(polygons)] == [p.wkb for p in polygons]
+
+
+def test_an_outline_without_an_area_goes_where_another_stays():
+    line = shapely.Polygon([(0, 0), (1, 0), (1, 1e-9)])
+    assert settle_outlines([line, shapely.box(0, 0, 1, 1)]) == [shapely.box(0, 0, 1, 1)]
+    assert len(settle_outlines([line])) == 1
+
+
+ROOFS = sorted((Path(__file__).parents[1] / "regressions").glob("*/roof.json"))
+
+
+def read_roof(path):
+    stored = json.loads(path.read_text())
+    parts = [
+        Part(
+            "free",
+            tuple(Piece(shapely.from_wkt(p["outline"]), np.array(p["planes"])) for p in pieces),
+        )
+        for pieces in stored["parts"]
+    ]
+    return Roof(tuple(parts), shapely.from_wkt(stored["outline"]), FRAME)
+
+
+@pytest.mark.parametrize("path", ROOFS, ids=lambda path: path.parent.name)
+def test_roof_becomes_a_valid_solid(path):
+    assert check_solid(compose(read_roof(path), -2.0)) == ()

@@ -1,5 +1,5 @@
 """Where parts show: areas that share nothing, are the outline together, and lie where no other part
-is higher.
+is higher; heights at many points are those of each part.
 """
 
 import json
@@ -16,6 +16,7 @@ from hiproof.compose import compose
 from hiproof.evaluate.models import read_models
 from hiproof.frames import LocalFrame
 from hiproof.model import Building, Model, Part, Piece, Roof, shown
+from hiproof.model.heights import find_highest
 from hiproof.model.roof_figures import roof_figures
 from hiproof.model.shown import share_surface
 from hiproof.status import Status
@@ -197,3 +198,17 @@ def test_the_visible_pieces_of_a_model_are_computed_once(monkeypatch):
     (area,) = building.compute_visible_areas()
     assert building.model.visible_m2 == (pytest.approx(area.area),)
     assert building.compute_visible_areas() and len(calls) == 1
+
+
+def test_the_highest_part_is_found_at_every_point():
+    rng = np.random.default_rng(3)
+    corners = rng.uniform(0.0, 40.0, (30, 2))
+    outlines = shapely.buffer(shapely.points(corners), rng.uniform(1.0, 20.0, 30), quad_segs=2)
+    planes = rng.normal(0.0, 1.0, (30, 2, 3))
+    pieces = [Piece(o, p) for o, p in zip(outlines, planes, strict=True)]
+    parts = [Part("free", (piece,)) for piece in pieces]
+    xy = rng.uniform(-5.0, 45.0, (5_000, 2))
+    heights = np.array([part.height_at(xy) for part in parts])
+    z, top = find_highest(parts, xy)
+    assert np.array_equal(z, heights.max(axis=0))
+    assert np.array_equal(top, heights.argmax(axis=0))
