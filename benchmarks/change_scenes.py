@@ -192,7 +192,7 @@ def run_scene(scene: ChangeScene, folder: Path, seed: int, is_verbose: bool) -> 
         counts["changed" if house.kind else "alarms"] += bool(house.kind) or is_found
         counts["hits"] += bool(house.kind) and is_found
         counts["right"] += bool(house.kind) and row["kind"] == house.kind
-        if is_verbose and (is_found != bool(house.kind) or house.kind != row["kind"]):
+        if is_verbose and (is_found or house.kind) and house.kind != row["kind"]:
             print(f"    {house.id} {house.building.type}: {house.kind or 'nothing'} -> {row}")
     lost = measure_lost(folder / "updated", houses, is_verbose)
     counts += Counter(whole=sum(share > LEFT_WHOLE for _, share, _ in lost))

@@ -13,6 +13,7 @@ import dataclasses
 import hashlib
 import warnings
 from collections.abc import Iterable, Iterator
+from itertools import product
 
 import numpy as np
 import shapely
@@ -21,7 +22,6 @@ from ...errors import InputWarning, is_interrupt
 from ...fit.registration import (
     FARTHEST_SHIFT_M,
     LEAST_FOOTPRINTS,
-    SIGMAS,
     Registration,
     register,
 )
@@ -43,8 +43,13 @@ ENOUGH_FOOTPRINTS, MOST_CELLS, MOST_FILES = 400, 16, 8
 The others bound what is read for it.
 """
 
-SUSPECTED_M = 0.5
-"""Length (m) of an unclear shift from which on it is told: sound outlines lie 0.1 to 0.3 m off."""
+SUSPECTED_M, TWO_SIGMAS = 0.5, 2.0
+"""Length (m) of an unclear shift, with so many standard deviations, from which on a warning gives
+it: sound outlines lie 0.1 to 0.3 m off."""
+
+BORDER_M = 0.5
+"""Distance (m) by which footprints may reach beyond the clouds: as far as sparse points lie apart,
+also between two files."""
 
 CELL_MARGIN_M = FARTHEST_SHIFT_M + 1.0
 """How far (m) around a square footprints bear on its points."""
@@ -80,8 +85,9 @@ def find_registration(
 
     Points are those of the files with `headers`.
     """
-    polygons = np.array([f.polygon for f in footprints if not f.polygon.is_empty])
     boxes = read_boxes(headers, units)
+    polygons = np.array([f.polygon for f in footprints if not f.polygon.is_empty])
+    polygons = polygons[lie_within(polygons, boxes)]
     number_of = footprints_by_cell(polygons)
     cells, files = sample_cells(number_of, boxes)
     points = points_by_cell(
@@ -100,12 +106,13 @@ def find_registration(
 
 
 def is_suspected(registration: Registration) -> bool:
-    """Return whether footprints seem to lie beside their roofs, though they are not moved."""
+    """Return whether footprints may lie beside their roofs, though they are not moved."""
+    largest_m = registration.length + TWO_SIGMAS * max(registration.sigma)
     return (
         not registration.is_clear
         and registration.footprints >= LEAST_FOOTPRINTS
-        and registration.length >= SUSPECTED_M
-        and registration.length > SIGMAS * max(registration.sigma)
+        and registration.squares > 0
+        and largest_m >= SUSPECTED_M
     )
 
 
@@ -114,9 +121,10 @@ def warn_if_moved(registration: Registration, path: str) -> None:
     if is_suspected(registration):
         (x, y), sigma = registration.xy, max(registration.sigma)
         warnings.warn(
-            f"{mask(path)}: all footprints seem to lie ({-x:.2f}, {-y:.2f}) m beside their roofs, "
-            f"with a standard deviation of {sigma:.2f} m, but {registration.footprints} of them "
-            "show too little to move them; check the CRS of footprints and clouds",
+            f"{mask(path)}: all footprints may lie beside their roofs, by ({-x:.2f}, {-y:.2f}) m "
+            f"with a standard deviation of {sigma:.2f} m. The {registration.footprints} used "
+            "show too little to tell, so they are not moved all alike; compare them with the "
+            "cloud, and check the CRS of both",
             InputWarning,
         )
     if registration.is_clear:
@@ -141,13 +149,30 @@ def read_boxes(headers: list[PointFileHeader], units: Units) -> np.ndarray:
     return boxes
 
 
+def lie_within(polygons: np.ndarray, boxes: np.ndarray) -> np.ndarray:
+    """Return which polygons lie wholly within the `boxes` (n, 4) of the clouds.
+
+    A roof that the border of the clouds cuts fits its footprint in many places.
+    """
+    if not np.isfinite(boxes).all():
+        return np.ones(len(polygons), bool)
+    clouds = shapely.union_all(shapely.box(*(boxes + [-BORDER_M, -BORDER_M, BORDER_M, BORDER_M]).T))
+    shapely.prepare(clouds)
+    return shapely.covers(clouds, polygons)
+
+
 def footprints_by_cell(polygons: np.ndarray) -> dict[Cell, int]:
-    """Count the footprints with their lower left corner in each square."""
-    lower = np.floor(shapely.bounds(polygons).reshape(-1, 4)[:, :2] / SAMPLE_CELL_M).astype(
-        np.int64
-    )
-    places, counts = np.unique(lower, axis=0, return_counts=True)
-    return {(int(i), int(j)): int(n) for (i, j), n in zip(places, counts, strict=True)}
+    """Count the footprints with their lower left corner in each square.
+
+    Squares that footprints only reach into have 0: without them roofs on a border would be cut, and
+    half a roof fits its footprint in many places.
+    """
+    bounds = np.floor(shapely.bounds(polygons).reshape(-1, 4) / SAMPLE_CELL_M).astype(np.int64)
+    reached = np.unique(bounds[(bounds[:, :2] < bounds[:, 2:]).any(axis=1)], axis=0).tolist()
+    spans = [(range(x, last_x + 1), range(y, last_y + 1)) for x, y, last_x, last_y in reached]
+    places, counts = np.unique(bounds[:, :2], axis=0, return_counts=True)
+    lower = zip(map(tuple, places.tolist()), counts.tolist(), strict=True)
+    return dict.fromkeys((cell for span in spans for cell in product(*span)), 0) | dict(lower)
 
 
 def sample_cells(number_of: dict[Cell, int], boxes: np.ndarray) -> tuple[list[Cell], set[int]]:
