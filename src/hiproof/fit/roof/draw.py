@@ -30,10 +30,13 @@ SHARED_BORDER_M = 0.1  # Shortest stretch (m) of border that two fragments share
 STEP_SAMPLE_M = 0.5  # Distance (m) of the places in which the height of a step is measured.
 EDGE_OFFSET_M = 0.01  # Distance (m) from an edge in which the roof beside it is measured.
 
-Drawing = namedtuple("Drawing", "count rings sizes owners numbers boxes pieces todo done")
+Drawing = namedtuple(
+    "Drawing", "count rings sizes owners numbers boxes scratch halves pieces notes"
+)
 """Room for fragments: `rings` (f, RING_CORNERS, 2) of `sizes` (f,) corners, each visible of the
 volume and plane in `owners` (f, 2). `count` (1,) are in use. Equal planes have one of `numbers`
-(v, VOLUME_PLANES). `boxes` (f, 4) are the extents of the fragments, the rest is scratch.
+(v, VOLUME_PLANES). `boxes` (f, 4) are the extents of the fragments, the rest is scratch: `pieces`
+are rings, of which `notes` hold the size and the volume before which nothing hides each.
 """
 
 
@@ -46,24 +49,24 @@ def make_drawing(volumes: int) -> Drawing:
         np.zeros((MOST_FRAGMENTS, 2), np.int64),
         np.zeros((volumes, VOLUME_PLANES), np.int64),
         np.zeros((MOST_FRAGMENTS, 4)),
-        np.zeros((4, RING_CORNERS, 2)),
-        make_pieces(),
-        make_pieces(),
-    )
-
-
-def make_pieces() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return room for rings, their sizes, and the volume before which nothing hides each."""
-    return (
-        np.zeros((PIECE_ROOM, RING_CORNERS, 2)),
-        np.zeros(PIECE_ROOM, np.int64),
-        np.zeros(PIECE_ROOM, np.int64),
+        np.zeros((5, RING_CORNERS, 2)),
+        np.zeros((N_SIDES + VOLUME_PLANES, 3)),
+        np.zeros((2 * PIECE_ROOM, RING_CORNERS, 2)),
+        np.zeros((2 * PIECE_ROOM, 2), np.int64),
     )
 
 
 @compiled
-def cut(ring, size, a, b, c, out):
-    """Keep of a convex ring what has a x + b y + c >= 0. Returns the number of corners in `out`."""
+def cut(ring, size, a, b, c, room):
+    """Keep of a convex ring what has a x + b y + c >= 0. Returns how many corners it has then.
+
+    `room` is for a ring.
+    """
+    is_whole = True
+    for i in range(size):
+        is_whole &= a * ring[i, 0] + b * ring[i, 1] + c >= -ON_LINE_M
+    if is_whole:
+        return size
     count = 0
     x0, y0 = ring[size - 1, 0], ring[size - 1, 1]
     d0 = a * x0 + b * y0 + c
@@ -73,12 +76,14 @@ def cut(ring, size, a, b, c, out):
         if (d0 > ON_LINE_M and d1 < -ON_LINE_M) or (d0 < -ON_LINE_M and d1 > ON_LINE_M):
             if count < RING_CORNERS:
                 t = d0 / (d0 - d1)
-                out[count, 0], out[count, 1] = x0 + t * (x1 - x0), y0 + t * (y1 - y0)
+                room[count, 0], room[count, 1] = x0 + t * (x1 - x0), y0 + t * (y1 - y0)
                 count += 1
         if d1 >= -ON_LINE_M and count < RING_CORNERS:
-            out[count, 0], out[count, 1] = x1, y1
+            room[count, 0], room[count, 1] = x1, y1
             count += 1
         x0, y0, d0 = x1, y1, d1
+    for i in range(count):
+        ring[i, 0], ring[i, 1] = room[i, 0], room[i, 1]
     return count if count >= 3 else 0
 
 
@@ -137,76 +142,74 @@ def number_planes(roof, view, numbers):
 
 
 @compiled
-def hidden_half(roof, numbers, j, p, k, h):
-    """Return the half plane h of what volume k hides of plane p of volume j.
+def list_halves(roof, numbers, j, p, k, halves):
+    """Set the half planes (h, 3) of what volume k hides of plane p of volume j.
 
     The first four are its sides, the others where its planes are higher. Of equal planes the first
     volume's is visible.
     """
-    if h < N_SIDES:
-        return roof.half_planes[k, h, 0], roof.half_planes[k, h, 1], roof.half_planes[k, h, 2]
-    q = h - N_SIDES
-    if numbers[k, q] == numbers[j, p]:
-        return 0.0, 0.0, 1.0 if k < j else -1.0
-    return (
-        roof.planes[k, q, 0] - roof.planes[j, p, 0],
-        roof.planes[k, q, 1] - roof.planes[j, p, 1],
-        roof.planes[k, q, 2] - roof.planes[j, p, 2],
-    )
+    is_equal_hidden = 1.0 if k < j else -1.0
+    for i in range(3):
+        for h in range(N_SIDES):
+            halves[h, i] = roof.half_planes[k, h, i]
+        for q in range(roof.n_planes[k]):
+            half = roof.planes[k, q, i] - roof.planes[j, p, i]
+            if numbers[k, q] == numbers[j, p]:
+                half = is_equal_hidden if i == 2 else 0.0
+            halves[N_SIDES + q, i] = half
 
 
 @compiled
-def add_piece(pieces, count, ring, size, floor):
-    """Add a ring to pieces if it is large enough. Returns how many there are."""
+def add_piece(pieces, notes, first, count, ring, size, floor):
+    """Add a ring to the `count` pieces from `first` on if it is large enough. Returns how many."""
     if size == 0 or count >= PIECE_ROOM or measure_area(ring, size) < FRAGMENT_M2:
         return count
-    copy_ring(ring, size, pieces[0][count])
-    pieces[1][count], pieces[2][count] = size, floor
+    t = first + count
+    for i in range(size):
+        pieces[t, i, 0], pieces[t, i, 1] = ring[i, 0], ring[i, 1]
+    notes[t, 0], notes[t, 1] = size, floor
     return count + 1
 
 
 @compiled
-def subtract(roof, numbers, j, p, k, halves, source, target, count, rest, other):
-    """Cut pieces along the first `halves` half planes of what volume k hides of plane p of j.
+def subtract(box, halves, k, shows, pieces, notes, source, target, count, scratch):
+    """Cut pieces along the half planes (h, 3) of what volume k, inside a `box`, hides.
 
-    What is inside of all is hidden, and left out, unless `halves` are k's sides alone and k came
-    before j: then nothing that came before k hides it. Returns how many pieces `target` has.
+    What is inside of all is left out, or `shows`: then nothing that came before k hides it. The
+    pieces begin at `source`, the new ones at `target`. Returns how many these are.
     """
-    rings, sizes, floors, kept = source[0], source[1], source[2], 0
-    for t in range(count):
-        size, left = sizes[t], 0
-        x0, x1, y0, y1 = measure_box(rings[t], size)
-        if k >= floors[t] and meets(roof.boxes[k], x0 + 1e-6, x1 - 1e-6, y0 + 1e-6, y1 - 1e-6):
-            copy_ring(rings[t], size, rest)
+    kept, rest, other, room = 0, scratch[2], scratch[3], scratch[4]
+    for t in range(source, source + count):
+        ring, size, floor, left = pieces[t], notes[t, 0], notes[t, 1], 0
+        x0, x1, y0, y1 = measure_box(ring, size)
+        if k >= floor and meets(box, x0 + 1e-6, x1 - 1e-6, y0 + 1e-6, y1 - 1e-6):
+            copy_ring(ring, size, rest)
             left = size
-            for h in range(halves):
-                a, b, c = hidden_half(roof, numbers, j, p, k, h)
-                left = cut(rest, left, a, b, c, other)
+            for h in range(len(halves)):
+                left = cut(rest, left, halves[h, 0], halves[h, 1], halves[h, 2], room)
                 if left == 0:
                     break
-                copy_ring(other, left, rest)
         if left == 0 or measure_area(rest, left) < FRAGMENT_M2:
-            kept = add_piece(target, kept, rings[t], size, floors[t])
+            kept = add_piece(pieces, notes, target, kept, ring, size, floor)
             continue
-        if halves == N_SIDES and k < j:
-            kept = add_piece(target, kept, rest, left, k)
-        copy_ring(rings[t], size, rest)
+        if shows:
+            kept = add_piece(pieces, notes, target, kept, rest, left, k)
+        copy_ring(ring, size, rest)
         left = size
-        for h in range(halves):
-            a, b, c = hidden_half(roof, numbers, j, p, k, h)
-            kept = add_piece(target, kept, other, cut(rest, left, -a, -b, -c, other), floors[t])
-            left = cut(rest, left, a, b, c, other)
-            if left == 0:
-                break
-            copy_ring(other, left, rest)
+        for h in range(len(halves)):
+            a, b, c = halves[h, 0], halves[h, 1], halves[h, 2]
+            copy_ring(rest, left, other)
+            outside = cut(other, left, -a, -b, -c, room)
+            kept = add_piece(pieces, notes, target, kept, other, outside, floor)
+            left = cut(rest, left, a, b, c, room)
     return kept
 
 
 @compiled
 def draw_plane(roof, drawing, view, j, p, part, size):
     """Add the visible fragments of plane p of volume j in a convex part of the outline."""
-    numbers, pieces = drawing.numbers, drawing.pieces
-    plan, other = pieces[0], pieces[1]
+    numbers, halves, planes, scratch = drawing.numbers, drawing.halves, roof.planes, drawing.scratch
+    pieces, notes, boxes, plan = drawing.pieces, drawing.notes, roof.boxes, scratch[1]
     copy_ring(part, size, plan)
     for q in range(roof.n_planes[j]):
         if q != p:
@@ -214,41 +217,44 @@ def draw_plane(roof, drawing, view, j, p, part, size):
                 if q < p:
                     return
                 continue
-            a = roof.planes[j, q, 0] - roof.planes[j, p, 0]
-            b = roof.planes[j, q, 1] - roof.planes[j, p, 1]
-            size = cut(plan, size, a, b, roof.planes[j, q, 2] - roof.planes[j, p, 2], other)
+            a, b = planes[j, q, 0] - planes[j, p, 0], planes[j, q, 1] - planes[j, p, 1]
+            size = cut(plan, size, a, b, planes[j, q, 2] - planes[j, p, 2], scratch[4])
             if size == 0:
                 return
-            copy_ring(other, size, plan)
-    if measure_area(plan, size) < FRAGMENT_M2:
-        return
-    source, target = drawing.todo, drawing.done
-    rest = pieces[2]
-    count = add_piece(source, 0, plan, size, j if roof.replaces[j] else 0)
+    source, target = 0, PIECE_ROOM
+    count = add_piece(pieces, notes, source, 0, plan, size, j if roof.replaces[j] else 0)
     x0, x1, y0, y1 = measure_box(plan, size)
     for turn in range(2):  # first, what came before a volume that replaces can no longer hide
         for m in range(len(view)):
             k = view[m]
-            hides_all = roof.replaces[k] and k > j
-            if k == j or not meets(roof.boxes[k], x0, x1, y0, y1):
+            replaces, is_later = roof.replaces[k] > 0, k > j
+            if k == j or count == 0 or (turn == 0 and not (replaces and not is_later)):
                 continue
-            if turn == 0 and not (roof.replaces[k] and k < j):
+            if not meets(boxes[k], x0, x1, y0, y1):
                 continue
-            halves = N_SIDES + (0 if turn == 0 or hides_all else roof.n_planes[k])
-            count = subtract(roof, numbers, j, p, k, halves, source, target, count, rest, pieces[3])
+            list_halves(roof, numbers, j, p, k, halves)
+            hides_all = turn == 0 or (replaces and is_later)
+            of_k = halves[: N_SIDES if hides_all else N_SIDES + roof.n_planes[k]]
+            count = subtract(
+                boxes[k], of_k, k, turn == 0, pieces, notes, source, target, count, scratch
+            )
             source, target = target, source
-            if count == 0:
-                return
-    for t in range(count):
-        f = drawing.count[0]
-        if f < MOST_FRAGMENTS:
-            copy_ring(source[0][t], source[1][t], drawing.rings[f])
-            drawing.sizes[f] = source[1][t]
-            drawing.owners[f, 0], drawing.owners[f, 1] = j, p
-            low_x, high_x, low_y, high_y = measure_box(source[0][t], source[1][t])
-            drawing.boxes[f, 0], drawing.boxes[f, 1] = low_x - ONE_PLACE_M, high_x + ONE_PLACE_M
-            drawing.boxes[f, 2], drawing.boxes[f, 3] = low_y - ONE_PLACE_M, high_y + ONE_PLACE_M
-            drawing.count[0] = f + 1
+    for t in range(source, source + count):
+        add_fragment(drawing, j, p, pieces[t], notes[t, 0])
+
+
+@compiled
+def add_fragment(drawing, j, p, ring, size):
+    """Add a ring to the drawing, where plane p of volume j is visible."""
+    f, boxes = drawing.count[0], drawing.boxes
+    if f < MOST_FRAGMENTS:
+        copy_ring(ring, size, drawing.rings[f])
+        drawing.sizes[f] = size
+        drawing.owners[f, 0], drawing.owners[f, 1] = j, p
+        x0, x1, y0, y1 = measure_box(ring, size)
+        boxes[f, 0], boxes[f, 1] = x0 - ONE_PLACE_M, x1 + ONE_PLACE_M
+        boxes[f, 2], boxes[f, 3] = y0 - ONE_PLACE_M, y1 + ONE_PLACE_M
+        drawing.count[0] = f + 1
 
 
 @compiled
@@ -256,7 +262,7 @@ def draw(roof, drawing, view, site, box):
     """Draw the volumes of `view` (m,) in the parts of the outline that reach into a `box` (4,)."""
     drawing.count[0] = 0
     number_planes(roof, view, drawing.numbers)
-    plan, other = np.empty((RING_CORNERS, 2)), np.empty((RING_CORNERS, 2))
+    plan, room = drawing.scratch[0], drawing.scratch[4]
     for part in range(len(site.part_sizes)):
         bounds = site.part_boxes[part]
         if not meets(box, bounds[0], bounds[1], bounds[2], bounds[3]):
@@ -269,10 +275,9 @@ def draw(roof, drawing, view, site, box):
             copy_ring(site.parts[part], size, plan)
             for s in range(N_SIDES):
                 half = roof.half_planes[j, s]
-                size = cut(plan, size, half[0], half[1], half[2], other)
+                size = cut(plan, size, half[0], half[1], half[2], room)
                 if size == 0:
                     break
-                copy_ring(other, size, plan)
             if size == 0 or measure_area(plan, size) < FRAGMENT_M2:
                 continue
             for p in range(roof.n_planes[j]):
