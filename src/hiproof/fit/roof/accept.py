@@ -42,8 +42,8 @@ Known = namedtuple("Known", "boxes samples sizes weights misfits units next")
 """What is known of boxes (q, 4) of the roof as it is.
 
 Of each: the points and cells that judge it first, `samples` (q, FIRST_JUDGES) of `sizes` (q,), each
-for `weights` (q,) points, and its misfit (points, by these) and units. `next` (1,) is the place
-that is used next.
+for `weights` (q,) points, its misfit (points, by these), and its units with those of the tables.
+`next` (1,) is the place that is used next.
 """
 
 
@@ -109,7 +109,7 @@ def know_box(roof, drawing, site, box, known):
     known.samples[q, : len(sample)] = sample
     known.sizes[q], known.weights[q] = len(sample), len(points) / max(len(sample), 1)
     known.misfits[q] = known.weights[q] * price_misfit(roof, site, view, sample)
-    known.units[q] = price_drawing(roof, drawing, view, site, box)
+    known.units[q] = price_drawing(roof, drawing, view, site, box) + price_tables(roof)
     return q
 
 
@@ -118,21 +118,38 @@ def try_move(roof, trial, move, site, drawing, known, changed, box, exact):
     """Apply a move to a copy of the roof, fit it, and return what it saves (points).
 
     `trial`, `changed` and `box` are set. A move that is not possible saves nothing. Unless it is to
-    be `exact`, a sample of the points judges.
+    be `exact`, a sample of the points judges, and then all of them if they may say otherwise.
     """
     copy_tables(roof, trial)
     if not has_room(trial) or not apply_move(trial, move, site, changed):
         return 0.0
     measure_change(roof, trial, changed, site, box)
     q = know_box(roof, drawing, site, box, known)
-    points, weight, misfit = known.samples[q, : known.sizes[q]], known.weights[q], known.misfits[q]
-    if exact and weight > 1.0:
-        points, weight = list_points(site, box), 1.0
-        misfit = price_misfit(roof, site, list_view(roof, box), points)
+    weight, misfit, units = known.weights[q], known.misfits[q], known.units[q]
     view = list_view(trial, box)
     if len(view) == 0:
         return 0.0
-    limit = misfit + site.unit * (known.units[q] + price_tables(roof) - price_tables(trial))
+    if weight == 1.0 or not exact:
+        points, values = known.samples[q, : known.sizes[q]], trial.values.copy()
+        gain = judge(trial, site, drawing, view, box, points, weight, misfit, units)
+        is_small = move[0] == SHARE or move[0] == TO_POINTS
+        if weight == 1.0 or not is_small or abs(gain) >= SMALL_UNITS * site.unit:
+            return gain
+        trial.values[:] = values
+        for m in range(len(view)):
+            place_planes(trial, view[m])
+    points = list_points(site, box)
+    misfit = price_misfit(roof, site, list_view(roof, box), points)
+    return judge(trial, site, drawing, view, box, points, 1.0, misfit, units)
+
+
+@compiled
+def judge(trial, site, drawing, view, box, points, weight, misfit, units):
+    """Fit a trial in a box to points, each for `weight`, and return what it saves (points).
+
+    `misfit` (points) and `units` are those of the roof as it is.
+    """
+    limit = misfit + site.unit * (units - price_tables(trial))
     hope = limit + HOPE_UNITS * site.unit
     if weight * price_misfit(trial, site, view, points) > hope:
         return 0.0
@@ -172,9 +189,6 @@ def improve(roof, trial, site, drawing):
         count = list_moves(roof, site, asked, moves)
         for m in range(count):
             gains[m] = try_move(roof, trial, moves[m], site, drawing, known, changed, box, False)
-            is_small = moves[m, 0] == SHARE or moves[m, 0] == TO_POINTS
-            if is_small and abs(gains[m]) < SMALL_UNITS * site.unit:
-                gains[m] = try_move(roof, trial, moves[m], site, drawing, known, changed, box, True)
         order, has_improved = np.argsort(-gains[:count]), False
         touched[:] = False
         for q in range(count):

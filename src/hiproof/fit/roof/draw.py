@@ -410,17 +410,6 @@ def count_corners(roof, drawing, box):
 
 
 @compiled
-def find_lowest_plane(rows, count, x, y):
-    """Return the height and the number of the lowest of the first `count` planes over a place."""
-    lowest, plane = np.inf, -1
-    for p in range(count):
-        z = rows[p, 0] * x + rows[p, 1] * y + rows[p, 2]
-        if z < lowest:
-            lowest, plane = z, p
-    return lowest, plane
-
-
-@compiled
 def compute_height(roof, view, x, y, reach):
     """Return the height of the roof over a place, the volume and the plane; -inf where none is.
 
@@ -439,7 +428,11 @@ def compute_height(roof, view, x, y, reach):
             is_inside &= halves[k, s, 0] * x + halves[k, s, 1] * y + halves[k, s, 2] >= -reach
         if not is_inside:
             continue
-        lowest, lowest_plane = find_lowest_plane(rows[k], roof.n_planes[k], x, y)
+        lowest, lowest_plane = np.inf, -1
+        for p in range(roof.n_planes[k]):
+            z = rows[k, p, 0] * x + rows[k, p, 1] * y + rows[k, p, 2]
+            if z < lowest:
+                lowest, lowest_plane = z, p
         if roof.replaces[k] or lowest > height:
             height, volume, plane = lowest, k, lowest_plane
     return height, volume, plane

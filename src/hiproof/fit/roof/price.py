@@ -12,14 +12,7 @@ import numpy as np
 
 from ...compiled import compiled
 from ..union.objective import compute_cell_cost, compute_point_cost
-from .draw import (
-    compute_heights,
-    count_corners,
-    draw,
-    find_lowest_plane,
-    measure_low_steps,
-    meets,
-)
+from .draw import compute_heights, count_corners, draw, measure_low_steps, meets
 from .prices import (
     CORNER_UNITS,
     LOW_STEP_UNITS,
@@ -178,13 +171,18 @@ def sum_normal_equations(roof, site, view, points, places, matrix, vector):
     """
     matrix[:], vector[:] = 0.0, 0.0
     count, squares = 0, 0.0
+    points = points[: np.searchsorted(points, site.n)]
     heights, volumes, n = compute_judged_heights(roof, site, view, points)
     for m in range(n):
         i, k = points[m], volumes[m]
-        residual = site.z[i] - heights[m]
+        x, y, residual = site.x[i], site.y[i], site.z[i] - heights[m]
         if k < 0 or abs(residual) > site.dead + site.width:
             continue
-        _, p = find_lowest_plane(roof.planes[k], roof.n_planes[k], site.x[i], site.y[i])
+        lowest, p = np.inf, -1
+        for q in range(roof.n_planes[k]):
+            z = roof.planes[k, q, 0] * x + roof.planes[k, q, 1] * y + roof.planes[k, q, 2]
+            if z < lowest:
+                lowest, p = z, q
         count += 1
         squares += residual * residual
         first, second, d = roof.heights[k, p], roof.slopes[k, p], 0.0
@@ -192,7 +190,7 @@ def sum_normal_equations(roof, site, view, points, places, matrix, vector):
         if second >= 0:
             line = roof.plane_lines[k, p]
             l = abs(line) - 1
-            d = roof.lines[l, 0] * site.x[i] + roof.lines[l, 1] * site.y[i] + roof.lines[l, 2]
+            d = roof.lines[l, 0] * x + roof.lines[l, 1] * y + roof.lines[l, 2]
             d = d if line > 0 else -d
             if places[second] < 0:
                 rest -= roof.values[second] * d
