@@ -21,11 +21,10 @@ from ..log import count_things
 from ..model import PointCloud
 from ..read.points.pointcloud import Box
 from ..settings import ReadSettings, Settings
-from .buildings import find_squares, list_squares
+from .buildings import RoofSearch, find_squares, list_squares, select_roof_candidates
 from .cells import plan_density
 from .cut_out import is_cut_out
 from .houses import separate_houses
-from .scene import RoofSearch, select_roof_candidates
 
 # steps, so that neighbouring tiles of one survey choose the same gap
 GAPS_M = (1.0, 1.5, 2.0, 3.0, 4.5, 6.0)

@@ -8,8 +8,7 @@ The package has the network, data sets, training and export.
     data       the source that a name stands for; real shapes: solids with a roofType
     network    PointNet++ in PyTorch, and arranged clouds as its tensors
     training   the recipe, checkpoints and the best by validation
-    export     to the ONNX file that `segment` runs
-    card       training curve and model card
+    export     to the ONNX file that `segment` runs; training curve and model card
 
 The only room that imports torch, and not before `train` is asked for.
 """

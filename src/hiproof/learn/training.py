@@ -24,9 +24,8 @@ from ..errors import InputError, OutputError, SettingsError
 from ..progress import Update, count_progress, ignore_progress
 from ..segment.arrange import Layout, arrange
 from ..segment.scores import Scores
-from .card import write_card, write_curve
 from .data import open_source
-from .export import export, read_weights
+from .export import export, read_weights, write_card, write_curve
 from .network import NetworkSettings, RoofNetwork, network_inputs
 from .sample import TRAINING, VALIDATION, AugmentSettings, Sample, Source, symmetric, vary_cloud
 

@@ -43,7 +43,7 @@ def settle_classes(clouds: tuple[str, ...], settings: Settings) -> Settings:
     if read.roofs == "auto" and (not counts or any(counts[c] for c in read.building_classes)):
         return settings
     # with scipy.ndimage: not where the clouds have a building class
-    from ...classify.scene import NO_ROOFS
+    from ...classify.buildings import NO_ROOFS
 
     selected_counts = tuple(
         sorted(c for c in counts if c not in NO_ROOFS and c not in read.ground_classes)

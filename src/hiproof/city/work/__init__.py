@@ -5,8 +5,7 @@ sort          each point file, read once in chunks, leaves the points each work 
 noted         where the points of each file lie, for whoever wants some of them again
 solve         each work tile reconstructs its own buildings and writes them as text, ready to join
 solved        buildings counted as they are solved, for the progress of a run
-ground        the ground around a building, from its tile's cells
-terrain_check a terrain model against the ground points
+ground        the ground around a building, from its tile's cells; a terrain model against it
 surveys       the points of several surveys, and those of which a model is made
 found         the roof of one building among points without classes
 other_classes what the points of other classes say of a building

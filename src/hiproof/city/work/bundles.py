@@ -41,8 +41,8 @@ from ...settings import Settings
 from ..plan.overrides import OVERRIDES_FILE
 from ..plan.work_plan import Job, WorkPlan, neighbourhood
 from .bundle_folders import FACTS, FAILURES_FOLDER, bundles_in, folder_name
+from .ground import TerrainModel
 from .sort import POINT_KINDS
-from .terrain_check import TerrainModel
 
 MOST_BUNDLES = 20  # Bundles of a run: more failures have the same few causes, and take space.
 CLASSES = dict(zip(POINT_KINDS, (6, 2, 1, 18), strict=True))  # ASPRS classes by the kind of points.

@@ -54,7 +54,10 @@ from .ground import (
     GroundAround,
     LowestAround,
     ModelAround,
+    TerrainModel,
+    WhereLikeGround,
     WhereSeen,
+    check_terrain,
     ground_cells,
     lowest_in_cells,
 )
@@ -67,7 +70,6 @@ from .other_classes import (
 )
 from .solved import count_building
 from .sort import load_points
-from .terrain_check import TerrainModel, WhereLikeGround, check_terrain
 
 # corners that change an outline by less make the area beside it slow to draw and no truer
 COARSEST_THINNING_M = 0.05
