@@ -194,9 +194,9 @@ class Desk:
                 edit = apply_edit(changed, {"action": "refit"}, points, self.run.settings)
             except HiproofError:
                 continue
-            candidates.append(
-                {"type": kind, "share": number_or_none(edit.quality.share_within_20cm)}
-            )
+            share = edit.quality.share_within_20cm
+            shown = round(float(share), 4) if np.isfinite(share) else None
+            candidates.append({"type": kind, "share": shown})
         return {"types": sorted(candidates, key=lambda row: -(row["share"] or 0.0))}
 
     def accept(self, id: str, body: Mapping[str, Any]) -> dict[str, Any]:
@@ -266,10 +266,6 @@ def names_of(row: BuildingRow) -> set[str]:
     They are its id and its kinds of attention.
     """
     return {row.id, *(kind.code for kind in row.attention)}
-
-
-def number_or_none(value: float) -> float | None:
-    return round(float(value), 4) if np.isfinite(value) else None
 
 
 def obeyed_by(folder: Path, moved_to: Path | None = None) -> dict[str, dict[str, Any]]:

@@ -111,7 +111,12 @@ def repair_polygon(polygon: shapely.Polygon) -> list[shapely.Polygon]:
     """
     if not is_buildings_size(polygon):
         return []
-    result = [polygon] if shapely.is_valid(polygon) else polygons_in(fill_rings(polygon))
+    if shapely.is_valid(polygon):
+        result = [polygon]
+    elif meetings(polygon) > MOST_MEETINGS:
+        return []
+    else:  # the area that its rings enclose; what they enclose twice counts once
+        result = polygons_in(repair_polygons(polygon))
     total = sum(part.area for part in result)
     smallest = min(SLIVER_M2, SLIVER_SHARE * total)
     return [
@@ -130,18 +135,6 @@ def is_buildings_size(polygon: shapely.Polygon) -> bool:
     return len(xy) > 0 and bool(
         is_plausible(xy).all() and np.ptp(xy, axis=0).max() <= WIDEST_BUILDING_M
     )
-
-
-def fill_rings(polygon: shapely.Polygon) -> shapely.Geometry | None:
-    """Return the area that the rings of a polygon enclose.
-
-    Area that they enclose twice counts once.
-
-    Returns None where too many edges meet.
-    """
-    if meetings(polygon) > MOST_MEETINGS:
-        return None
-    return repair_polygons(polygon)
 
 
 def meetings(polygon: shapely.Polygon) -> int:

@@ -406,15 +406,6 @@ def file_kind(path: str | Path) -> str:
     )
 
 
-def file_crs(path: str | Path) -> Any:
-    """Return the CRS that a point file names, None where it names none.
-
-    Text and PLY never name one. One that cannot be understood counts as none.
-    """
-    header = las_file_header(path)
-    return None if header is None or isinstance(header.crs, UnknownCRS) else header.crs
-
-
 def common_crs(crs_of: dict[str, Any], arguments: Any = None, unit: str = "auto") -> Any:
     """Return the one CRS of point files, from what each names.
 
@@ -472,9 +463,10 @@ def refuse_other_crs(files: list[str | Path], crs: Any, source: str) -> None:
     `source` named `crs`. An unknown CRS goes with any.
     """
     for file in files if crs is not None else ():
-        own_crs = file_crs(file)
-        if names_place(own_crs):
-            refuse_two(crs, source, own_crs, str(file))
+        header = las_file_header(file)  # text and PLY never name a CRS
+        if header is None or isinstance(header.crs, UnknownCRS) or not names_place(header.crs):
+            continue
+        refuse_two(crs, source, header.crs, str(file))
 
 
 def refuse_two(first: Any, first_source: str, second: Any, second_source: str) -> None:
