@@ -23,7 +23,7 @@ import hiproof
 from hiproof.city import run
 from hiproof.city.work import cores
 from hiproof.city.work import executors
-from hiproof.city.folder import lock
+from hiproof.city.folder import marks
 from hiproof.city.work import warm
 from hiproof.write import files
 print(cores.cores() > 0)
