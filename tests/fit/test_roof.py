@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import shapely
 
+from hiproof.fit.prices import compute_unit
 from hiproof.fit.roof import fit_building, start_roof
 from hiproof.fit.roof.accept import fit_roof, improve, make_known, try_move
 from hiproof.fit.roof.draw import (
@@ -14,7 +15,6 @@ from hiproof.fit.roof.draw import (
 )
 from hiproof.fit.roof.moves import LEAVE_OUT, MOVE_COLUMNS, list_moves
 from hiproof.fit.roof.price import price_roof
-from hiproof.fit.roof.prices import compute_unit
 from hiproof.fit.roof.site import make_site, split_convex
 from hiproof.fit.roof.tables import (
     VOLUME_COUNT,

@@ -8,7 +8,7 @@ from benchmarks.curved import DRUM_SETTINGS, draw_scene, is_drum_found, judge_sc
 import hiproof
 from hiproof.compose import check_solid, compose
 from hiproof.fit.roof import fit_building
-from hiproof.fit.shapes.round_ends import find_round_ends
+from hiproof.fit.shapes.arcs import find_arcs
 from hiproof.frames import LocalFrame
 from hiproof.model import Roof
 from hiproof.model.heights import find_highest
@@ -197,7 +197,7 @@ def test_a_level_or_a_hipped_end_stays_so():
     arc = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 13)
     ring = np.column_stack([10.0 + 3.0 * np.cos(arc), 4.0 + 3.0 * np.sin(arc)])
     outline = shapely.union(shapely.box(0.0, 0.0, 10.0, 8.0), shapely.Polygon(ring))
-    (end,) = find_round_ends(outline)
+    (end,) = find_arcs(outline)
     assert (end.radius, end.span_deg) == pytest.approx((3.0, 180.0), rel=0.01)
     assert end.centre == pytest.approx([10.0, 4.0], abs=0.01)
     level = sample_heights(lambda x, y: np.full(len(x), 5.0), outline)
@@ -209,7 +209,7 @@ def test_a_level_or_a_hipped_end_stays_so():
 def test_ordinary_outlines_have_no_round_ends():
     canted = shapely.Polygon([(0, 0), (9, 0), (10, 1), (10, 5), (9, 6), (1, 6), (0, 5)])
     bow = shapely.Polygon([(0, 0), (10, 0), *((10 - 2 * k, 6 + k * (5 - k) / 8) for k in range(6))])
-    assert find_round_ends(canted) == find_round_ends(bow) == []
+    assert find_arcs(canted) == find_arcs(bow) == []
 
 
 def test_an_apse_is_a_valid_solid_with_one_curved_surface():

@@ -9,6 +9,7 @@ walls          which points lie on walls
 tables         the catalogue as arrays
 kernel         the likelihood with gradient and Hessian, minimised; compiled
 paper          the objective of the paper, as published
+prices         the table of prices of a roof
 roof           `fit_building`: a roof of few volumes, drawn by one price and one loop
 union          the search for these volumes
 shapes         larger and curved shapes in place of its parts

@@ -12,7 +12,7 @@ schedule.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -116,6 +116,7 @@ class Search:
     family: np.ndarray
     low: np.ndarray  # (T, 9)
     high: np.ndarray
+    free: tuple[int, ...] = ()  # the numbers of a given plan that are fitted all the same
 
     def box(self, candidates: Candidates) -> tuple[np.ndarray, np.ndarray]:
         """Return bounds (m, 9) of each candidate.
@@ -124,7 +125,8 @@ class Search:
         """
         lower, upper = self.low[candidates.kinds], self.high[candidates.kinds]
         if not self.whole.plan_is_free:
-            lower[:, :Q0] = upper[:, :Q0] = candidates.thetas[:, :Q0]
+            given = [k for k in range(Q0) if k not in self.free]
+            lower[:, given] = upper[:, given] = candidates.thetas[:, given]
         return lower, upper
 
     def minimise(
@@ -231,13 +233,13 @@ def fit_likelihood(
 
 
 def fit_heights(
-    points: np.ndarray, primitive: Primitive, theta: np.ndarray
+    points: np.ndarray, primitive: Primitive, theta: np.ndarray, free: tuple[int, ...] = ()
 ) -> tuple[np.ndarray, Noise]:
     """Fit heights and slopes of one shape to `points` (n, 4) over the plan of `theta`.
 
-    Returns theta (9,) and the noise learnt.
+    The numbers `free` of the plan are fitted, too. Returns theta (9,) and the noise learnt.
     """
-    search = new_search(points, (primitive.name,), False, COARSE_POINTS)
+    search = replace(new_search(points, (primitive.name,), False, COARSE_POINTS), free=free)
     kind = search.shapes.index(primitive)
     thetas = theta[None]
     if primitive.minima:

@@ -35,12 +35,10 @@ def fit_regular(
 ) -> np.ndarray:
     """Fit theta (9,) of a shape as long as wide to points (n, 3) from a start.
 
-    The start's shorter side gives the width. Only the numbers `free` are fitted, by default all
+    Only the numbers `free` are fitted, by default all
     that the points determine.
     """
-    shape = shape.variant(shape.from_theta(theta)[0])
-    theta = theta.copy()
-    theta[[HALF_WIDTH, HALF_LENGTH]] = theta[[HALF_WIDTH, HALF_LENGTH]].min()
+    shape, free = shape.variant(shape.from_theta(theta)[0]), free or REGULAR[shape.name]
     starts = [theta]
     if shape.minima:  # Its top has few points, which a start that is not near leaves out.
         for bend in np.linspace(*shape.bounds[-1], BENDS_STARTED):
@@ -48,7 +46,7 @@ def fit_regular(
             starts[-1][shape.theta_size - 1] = bend
     for _ in range(WIDTH_ROUNDS):
         inside = points[np.hypot(*(points[:, :2] - theta[:2]).T) <= theta[HALF_WIDTH]]
-        fits = [approach(inside, shape, start, free or REGULAR[shape.name]) for start in starts]
+        fits = [approach(inside, shape, start, free) for start in starts]
         theta = min(fits, key=lambda one: one[0])[1]
         starts = [theta]
     return theta
@@ -76,11 +74,11 @@ def approach(
             break
         design = np.column_stack([measure_change(points, shape, theta, k, STEP) for k in free])
         move = np.linalg.lstsq(design * weights[:, None], off * weights, rcond=None)[0]
-        theta = theta.copy()
+        theta, half_width = theta.copy(), theta[HALF_WIDTH]
         theta[list(free)] += move
         theta[numbers] = np.clip(theta[numbers], lowest, highest)
         theta[plan] = np.clip(theta[plan], nearest, farthest)
-        theta[HALF_LENGTH] = theta[HALF_WIDTH]
+        theta[HALF_LENGTH] *= theta[HALF_WIDTH] / half_width
     return left, theta
 
 
@@ -145,6 +143,8 @@ def measure_change(
     points: np.ndarray, shape: Primitive, theta: np.ndarray, k: int, step: float
 ) -> np.ndarray:
     """Measure how the heights (n,) of a shape change with number `k` of theta."""
+    if k == Q0:
+        return np.ones(len(points))
     ends = []
     for way in (-step, step):
         moved = theta.copy()

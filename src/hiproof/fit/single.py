@@ -122,7 +122,9 @@ def make_regular(cloud: np.ndarray, estimate: Estimate) -> Estimate:
     A width that these do not show keeps the variance of the free plan.
     """
     points, shape = cloud[cloud[:, 3] >= ROOF_WEIGHT, :3], estimate.primitive
-    theta = fit_regular(points, shape, estimate.theta)
+    theta = estimate.theta.copy()
+    theta[[HALF_WIDTH, HALF_LENGTH]] = theta[[HALF_WIDTH, HALF_LENGTH]].min()
+    theta = fit_regular(points, shape, theta)
     inside = points[np.hypot(*(points[:, :2] - theta[:2]).T) <= theta[HALF_WIDTH]]
     before, after = (measure_misfit(inside, shape, one) for one in (estimate.theta, theta))
     if after > before + FARTHER_M:

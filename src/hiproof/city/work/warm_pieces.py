@@ -100,14 +100,6 @@ def single() -> None:
     fit_roof(house())
 
 
-def curves() -> None:
-    """Compile what shows that a part is none of the curved shapes."""
-    from ...fit.shapes.round_tops import find_centre, measure_fall
-
-    xyz, middle = house(), np.array([3.0, 3.5])
-    measure_fall(xyz, find_centre(xyz, middle, 3.0), 3.0, 0.5)
-
-
 def outlines() -> None:
     """Compile what runs without footprints draw: an outline for each house."""
     from ...fit.outline import estimate_outline
@@ -126,7 +118,7 @@ def points() -> None:
 
 
 PIECES: dict[str, Callable[[], None]] = {
-    piece.__name__: piece for piece in (moves, planes, outlines, solid, points, single, curves)
+    piece.__name__: piece for piece in (moves, planes, outlines, solid, points, single)
 }
 
 

@@ -4,7 +4,6 @@ A roof is four small tables (lines, unknowns, planes, volumes) that share what i
 is the misfit of every point and what its exact drawing costs. Moves propose, `accept` judges.
 
 tables      the state
-prices      the table of prices
 draw        compiled: the exact plan of a roof, its corners and low steps
 price       compiled: the price of a roof in a box, and the fit of its unknowns
 ends        compiled: where the points say that a volume ends
@@ -32,6 +31,7 @@ from ...primitives.catalogue import CATALOGUE, CURVED
 from ...primitives.family import name_among
 from ...read.plausible import is_plausible
 from ...settings import Settings
+from ..prices import UNKNOWN_UNITS, compute_unit
 from ..shapes.clamp import clamp_parts
 from ..shapes.composite import combine_parts
 from ..shapes.curved import fit_curved_shapes
@@ -52,7 +52,6 @@ from .draw import draw_whole_roof, make_drawing
 from .names import cut_sides, find_axes, read_planes, read_sides
 from .parts import name_planes
 from .price import Site
-from .prices import UNKNOWN_UNITS, compute_unit
 from .regions import list_places
 from .site import make_site
 from .start import make_roof

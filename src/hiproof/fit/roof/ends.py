@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...compiled import compiled
-from .prices import LEAN_UNITS
+from ..prices import LEAN_UNITS
 from .tables import N_SIDES, measure_middle
 
 REACH_M = 2.5  # Distance (m) from a side within which it may lie instead.

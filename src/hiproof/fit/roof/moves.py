@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from ...compiled import compiled
+from ..prices import LEAN_UNITS
 from .draw import meets
 from .ends import find_end
-from .prices import LEAN_UNITS
 from .tables import (
     FAR_M,
     LINE_COUNT,

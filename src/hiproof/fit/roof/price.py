@@ -11,9 +11,7 @@ from collections import namedtuple
 import numpy as np
 
 from ...compiled import compiled
-from ..union.objective import compute_cell_cost, compute_point_cost
-from .draw import compute_heights, count_corners, draw, measure_low_steps, meets
-from .prices import (
+from ..prices import (
     CORNER_UNITS,
     LOW_STEP_UNITS,
     SKEW_UNITS,
@@ -21,6 +19,8 @@ from .prices import (
     UNKNOWN_UNITS,
     VOLUME_UNITS,
 )
+from ..union.objective import compute_cell_cost, compute_point_cost
+from .draw import compute_heights, count_corners, draw, measure_low_steps, meets
 from .tables import LINE_COUNT, N_SIDES, ONE_PLANE, UNKNOWN_COUNT, VOLUME_COUNT, place_planes
 
 OVER_M = 0.03  # Points so far (m) beside a volume are over it.

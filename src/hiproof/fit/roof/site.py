@@ -7,9 +7,9 @@ from itertools import combinations, pairwise
 import numpy as np
 import shapely
 
+from ..prices import DEAD_M
 from .draw import RING_CORNERS
 from .price import Site
-from .prices import DEAD_M
 
 SHORTEST_EDGE_M = 0.7  # Shortest edge (m) of an outline along whose line a volume may end.
 SHORTEST_CHORD_M = 1.5  # Shortest line (m) between two corners.

@@ -1,18 +1,15 @@
-"""Fit larger and curved shapes in place of a roof's parts, and tidy the parts up.
+"""Fit composite and curved shapes in place of a roof's parts, and tidy the parts up.
 
-regions     what parts touch and cover
-shown       hidden parts removed
-composite   gambrels combined from their parts
-teeth       rows of equal monopitches as saw-teeth
-custom      custom shapes instead of neighbouring parts
-judged      roofs judged by points, with one shape in place of several parts
-round_ends  cones, spires, domes, onions and half cones over round stretches of the outline
-spires      how near points lie to spires
-round_tops  cones, spires, domes and onions around the tops of parts
-onions      onions around round parts, which may be their tops
-drums       level discs over arcs of the outline and around level parts
-barrels     barrel vaults over parts with slopes to two sides
-bases       one level part under and around a curved shape
-curved      these shapes where points follow them better
-clamp       heights limited to the range of the points
+regions    what parts touch and cover
+shown      hidden parts removed
+composite  gambrels combined from their parts
+teeth      rows of equal monopitches as saw-teeth
+accept     the price of a roof of parts, and the one place that judges shapes
+custom     custom shapes over neighbouring parts
+arcs       arcs of the outline
+rounds     cones, spires, domes, onions and half cones over arcs and around the tops of parts
+drums      level discs over arcs and around level parts
+barrels    barrel vaults over parts with slopes to two sides
+curved     these shapes in turn, where they are cheaper
+clamp      heights limited to the range of the points
 """

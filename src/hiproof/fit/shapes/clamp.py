@@ -75,46 +75,38 @@ def find_excess(
 
     They have one outline.
     """
-    (sunken, risen), *others = (find_piece_excess(piece, z_low, z_high) for piece in pieces)
-    for its_sunken, its_risen in others:
-        sunken = with_area(shapely.intersection(sunken, its_sunken, grid_size=OVERLAY_GRID_M))
-        risen = with_area(shapely.union(risen, its_risen, grid_size=OVERLAY_GRID_M))
-    return sunken, risen
+    outline, (lowest, highest) = pieces[0].outline, measure_range(pieces)
+    sunken = (
+        shapely.difference(outline, find_above(pieces, z_low), grid_size=OVERLAY_GRID_M)
+        if lowest < z_low
+        else NO_AREA
+    )
+    risen = (
+        shapely.intersection(outline, find_above(pieces, z_high), grid_size=OVERLAY_GRID_M)
+        if highest > z_high
+        else NO_AREA
+    )
+    return with_area(sunken), with_area(risen)
 
 
-def find_piece_excess(
-    piece: Piece, z_low: float, z_high: float
-) -> tuple[shapely.Geometry, shapely.Geometry]:
-    """Return where a piece is below `z_low`, and where above `z_high`.
-
-    One plane is enough to be below, all must be above.
-    """
-    z, sunken, risen = compute_corner_heights(piece), NO_AREA, NO_AREA
-    if z.min() < z_low:
-        rings = [
-            clip_ring(draw_box(piece.outline), *line)
-            for line in ([0.0, 0.0, z_low] - piece.planes).tolist()
-        ]
-        sunken_area = with_area(
-            shapely.union_all([shapely.Polygon(ring) for ring in rings], grid_size=OVERLAY_GRID_M)
-        )
-        sunken = with_area(
-            shapely.intersection(piece.outline, sunken_area, grid_size=OVERLAY_GRID_M)
-        )
-    if z.max(axis=0).min() > z_high:
-        ring = draw_box(piece.outline)
-        for line in (piece.planes - [0.0, 0.0, z_high]).tolist():
-            ring = clip_ring(ring, *line)
-        if ring:
-            risen = with_area(
-                shapely.intersection(piece.outline, shapely.Polygon(ring), grid_size=OVERLAY_GRID_M)
-            )
-    return sunken, risen
+def measure_range(pieces: list[Piece]) -> tuple[float, float]:
+    """Return bounds on the heights of pieces, from their planes at the corners of their outline."""
+    xy = shapely.get_coordinates(pieces[0].outline)
+    heights = [xy @ piece.planes[:, :2].T + piece.planes[:, 2] for piece in pieces]
+    lowest = max(float(z.min()) for z in heights)
+    return lowest, max(float(z.max(axis=0).min()) for z in heights)
 
 
-def compute_corner_heights(piece: Piece) -> np.ndarray:
-    """Return heights (n, k) of a piece's k planes at the corners of its outline."""
-    return shapely.get_coordinates(piece.outline) @ piece.planes[:, :2].T + piece.planes[:, 2]
+def find_above(pieces: list[Piece], z: float) -> shapely.Geometry:
+    """Return where a piece lies above `z`, within a box around their outline."""
+    x0, y0, x1, y1 = pieces[0].outline.bounds
+    rings = []
+    for piece in pieces:
+        ring = [(x0 - 1, y0 - 1), (x1 + 1, y0 - 1), (x1 + 1, y1 + 1), (x0 - 1, y1 + 1)]
+        for a, b, c in piece.planes.tolist():
+            ring = clip_ring(ring, a, b, c - z)
+        rings.append(shapely.Polygon(ring))
+    return shapely.union_all(rings, grid_size=OVERLAY_GRID_M)
 
 
 def make_level_part(polygons: list[shapely.Polygon], z: float) -> Part:
@@ -129,12 +121,6 @@ def make_level_part(polygons: list[shapely.Polygon], z: float) -> Part:
         0.0,
         np.array([0.5 * (x0 + x1), 0.5 * (y0 + y1), z]),
     )
-
-
-def draw_box(polygon: shapely.Polygon) -> list[tuple[float, float]]:
-    """Return the corners of a box around `polygon` with a margin."""
-    x0, y0, x1, y1 = polygon.bounds
-    return [(x0 - 1.0, y0 - 1.0), (x1 + 1.0, y0 - 1.0), (x1 + 1.0, y1 + 1.0), (x0 - 1.0, y1 + 1.0)]
 
 
 def clip_ring(

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import shapely
 
 from ...geometry.rings import OVERLAY_GRID_M, with_area
-from ...model import Part
+from ...model import Part, Piece
 
 # Polygons further apart (m) do not touch after rounding to the grid of overlays.
 OVERLAY_GAP_M = 1e-5
@@ -68,3 +69,18 @@ def find_neighbour(
         key=lambda place: (wide_gap.intersection(polygons[place[0]][place[1]]).area, place),
         default=(0, 0),
     )
+
+
+def cut_part(part: Part, outline: shapely.Polygon) -> Part:
+    """Return the part over `outline`, or the share of each piece of several."""
+    if len(part.outlines) == 1:
+        return replace(part, pieces=tuple(Piece(outline, p.planes) for p in part.pieces))
+    cut = [
+        (
+            list_polygons(shapely.intersection(p.outline, outline, grid_size=OVERLAY_GRID_M)),
+            p.planes,
+        )
+        for p in part.pieces
+    ]
+    pieces = [Piece(polygon, planes) for polygons, planes in cut for polygon in polygons]
+    return replace(part, pieces=tuple(pieces))

@@ -8,7 +8,7 @@ A unit is as many points as it must explain. Nothing but this table decides betw
 
 from __future__ import annotations
 
-from ..union.prices import DENSE_CLOUD, DENSE_GROWTH, DETAIL_FACTOR
+from .union.prices import DENSE_CLOUD, DENSE_GROWTH, DETAIL_FACTOR
 
 DEAD_M = 0.08  # Difference (m) that a person would leave out: it costs next to nothing.
 SMALL_GAP_POINTS = 0.015  # What it costs at most (points). It decides between equals.

@@ -1,0 +1,255 @@
+"""Price roofs of parts, and put shapes in place of parts where that is cheaper.
+
+The price is that of prices.py: the misfit of every point, and units for what the roof has.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import shapely
+
+from ...geometry.rings import OVERLAY_GRID_M
+from ...model import Part, Piece
+from ...model.heights import find_highest
+from ...primitives.catalogue import ROUND
+from ...settings import Settings
+from ..direction import outline_rectangle
+from ..prices import (
+    CORNER_UNITS,
+    DEAD_M,
+    SMALL_GAP_POINTS,
+    UNKNOWN_UNITS,
+    VOLUME_UNITS,
+    compute_unit,
+)
+from .regions import cut_part, exclude_parts, list_polygons, select_touching, unite_outlines
+from .shown import absorb_slivers
+
+UNDER_SHARE = 0.6  # Share of a part's points or area over which a shape lies to replace it.
+SAME_CORNER_M = 0.02  # Corners so near to a rim (m) lie on it.
+SAME_LEVEL_M = 0.15  # Points and parts so near to a level (m) belong to it.
+LEAST_UNITS = VOLUME_UNITS + 2.0 * UNKNOWN_UNITS  # Of a curved shape, with height and slope.
+NO_HEIGHTS = np.zeros(0)  # What is not seen has no heights.
+
+
+@dataclass(frozen=True)
+class PartsRoof:
+    """A roof of `parts`, the points (n, 3) inside its `outline`, and what they cost.
+
+    A point further than `tolerance_m` from the roof costs 1.
+    """
+
+    parts: list[Part]
+    points: np.ndarray
+    outline: shapely.Polygon
+    unit: float
+    tolerance_m: float
+
+    @cached_property
+    def highest(self) -> tuple[np.ndarray, np.ndarray]:
+        """The roof's height (n,) at each point, and the number of the part that has it."""
+        return find_highest(self.parts, self.points[:, :2])
+
+    @cached_property
+    def misfits(self) -> np.ndarray:
+        """What each point costs (n,)."""
+        return self.price_gaps(self.points[:, 2] - self.highest[0])
+
+    @cached_property
+    def price(self) -> float:
+        """What the roof costs, in points."""
+        return float(self.misfits.sum()) + self.unit * count_units(self.parts, self.outline)
+
+    @cached_property
+    def shares(self) -> tuple[np.ndarray, np.ndarray]:
+        """How many points see each part, at least 1, and the units of each."""
+        seen = np.bincount(self.highest[1], minlength=len(self.parts))
+        units = np.array([count_units([part], self.outline) for part in self.parts])
+        return np.maximum(seen, 1), units
+
+    def select_under(self, within: np.ndarray) -> np.ndarray:
+        """Return which parts are seen mostly at the points `within` (n,)."""
+        seen = np.bincount(self.highest[1], within, len(self.parts))
+        return seen >= UNDER_SHARE * self.shares[0]
+
+    def is_worth(self, within: np.ndarray, misfit: float, count: int = 0) -> bool:
+        """Return whether a shape with a misfit and `count` numbers can save at points `within`."""
+        under = self.select_under(within)
+        units = self.shares[1][under].sum() - LEAST_UNITS - UNKNOWN_UNITS * count
+        return bool(self.misfits[within].sum() + self.unit * units > misfit)
+
+    def price_gaps(self, gaps: np.ndarray) -> np.ndarray:
+        """Return what distances in height (n,) cost."""
+        gaps = np.abs(gaps)
+        beyond = np.clip((gaps - DEAD_M) / (self.tolerance_m - DEAD_M), 0.0, 1.0)
+        return beyond**2 + SMALL_GAP_POINTS * np.minimum(gaps / DEAD_M, 1.0) ** 2
+
+
+def make_parts_roof(
+    parts: list[Part], points: np.ndarray, outline: shapely.Polygon, settings: Settings
+) -> PartsRoof:
+    """Return the roof of parts with the prices of a cloud (n, 3)."""
+    unit = compute_unit(len(points) / outline.area, settings.compound)
+    return PartsRoof(parts, points, outline, unit, settings.compound.tolerance_m)
+
+
+def count_units(parts: list[Part], outline: shapely.Polygon) -> float:
+    """Count the units of parts, of their numbers and of the corners between them.
+
+    A rim that follows a curved shape has no corners of its own.
+    """
+    numbers = sum(1 + len(part.parameters.keys() - {"width", "length"}) for part in parts)
+    rims = [outline, *(rim for part in parts if is_disc(part) for rim in part.outlines)]
+    straight = [rim for part in parts if not is_disc(part) for rim in part.outlines]
+    xy = np.unique(np.round(shapely.get_coordinates(straight), 2), axis=0)
+    is_free = np.ones(len(xy), bool)
+    for rim in rims:
+        is_free &= ~shapely.dwithin(shapely.points(xy), rim.boundary, SAME_CORNER_M)
+    corners = int(np.count_nonzero(is_free))
+    return VOLUME_UNITS * len(parts) + UNKNOWN_UNITS * numbers + CORNER_UNITS * corners
+
+
+def is_disc(part: Part) -> bool:
+    """Return whether a part is a round shape or a drum."""
+    size = part.parameters
+    return part.type in (*ROUND, "half_cone") or (
+        part.type == "flat" and size.get("width") == size.get("length")
+    )
+
+
+def accept(roof: PartsRoof, shapes: Iterable[tuple[Part, int]]) -> PartsRoof:
+    """Return the cheapest roof with one of the shapes, or as it is.
+
+    Each shape comes with how many of its numbers nothing but points gives, beside its heights.
+    """
+    best, least = roof, roof.price
+    for shape, count in shapes:
+        for parts in list_roofs(roof, shape):
+            new = replace(roof, parts=parts)
+            price = new.price + UNKNOWN_UNITS * roof.unit * count
+            if price < least:
+                best, least = new, price
+    return best
+
+
+def accept_all(
+    roof: PartsRoof, list_shapes: Callable[[PartsRoof], Iterable[tuple[Part, int]]]
+) -> PartsRoof:
+    """Return the roof with one of the listed shapes after the other, until none saves."""
+    for _ in range(len(roof.parts)):
+        better = accept(roof, list_shapes(roof))
+        if better is roof:
+            break
+        roof = better
+    return roof
+
+
+def list_roofs(roof: PartsRoof, shape: Part) -> Iterator[list[Part]]:
+    """Yield roofs with a shape in place of what lies under it and follows points no better.
+
+    What other parts cover under it is theirs, or is cut off.
+    """
+    over, _ = find_highest([shape], roof.points[:, :2])
+    within, top, plan = np.isfinite(over), roof.highest[1], unite_outlines([shape])
+    changes = np.where(within, roof.price_gaps(roof.points[:, 2] - over) - roof.misfits, 0.0)
+    costs = np.bincount(top, changes, len(roof.parts))
+    is_under = roof.select_under(within) & (costs <= roof.unit * roof.shares[1])
+    replaced = [part for part, under in zip(roof.parts, is_under, strict=True) if under]
+    kept = exclude_parts(roof.parts, replaced)
+    for others in (kept, [trimmed for part in kept for trimmed in trim_part(part, plan)]):
+        yield from cover_bare_places(roof, others, shape, replaced)
+    yield from lay_base(roof, kept, shape, replaced)
+
+
+def trim_part(part: Part, plan: shapely.Geometry) -> list[Part]:
+    """Return a part without what lies in a plan, if most of it lies outside."""
+    pieces = tuple(
+        Piece(polygon, piece.planes)
+        for piece in part.pieces
+        for polygon in list_polygons(
+            shapely.difference(piece.outline, plan, grid_size=OVERLAY_GRID_M)
+        )
+    )
+    left = sum(piece.outline.area for piece in pieces)
+    return [part if left <= (1.0 - UNDER_SHARE) * part.area else replace(part, pieces=pieces)]
+
+
+def cover_bare_places(
+    roof: PartsRoof, others: list[Part], shape: Part, replaced: list[Part]
+) -> Iterator[list[Part]]:
+    """Yield roofs that cover what only the `replaced` parts did.
+
+    The shape has the bare places itself, or a neighbour has them, or a level part under the shape.
+    """
+    under, parts = unite_outlines(replaced), [*others, shape]
+    bare = shapely.difference(under, unite_outlines(parts), grid_size=OVERLAY_GRID_M)
+    places = make_flat(list_polygons(bare), shape)
+    if not places.pieces:
+        yield parts
+        return
+    wider = list_polygons(unite_outlines([shape, *replaced]))
+    if len(wider) == 1:
+        yield [*others, cut_part(shape, wider[0])]
+    absorbed = absorb_slivers(parts, places, math.inf)
+    if absorbed is not None:
+        yield absorbed
+    yield [make_flat(list_polygons(under), shape, select_heights(roof, bare)), *parts]
+
+
+def lay_base(
+    roof: PartsRoof, others: list[Part], shape: Part, replaced: list[Part]
+) -> Iterator[list[Part]]:
+    """Yield a roof with one level part under or around a shape in place of those beside it.
+
+    What the search leaves of a tower's top are strips beside the shape. Where its eave lies lower
+    than they do, a moat would surround it. Those at the level of the largest are replaced.
+    """
+    plan = unite_outlines([shape])
+    beside = [
+        part
+        for part in roof.parts
+        if part.type == "flat" and shapely.dwithin(unite_outlines([part]), plan, OVERLAY_GRID_M)
+    ]
+    if not beside:
+        return
+    level = max(beside, key=lambda part: part.area).translation[2]
+    levels = level, shape.translation[2] if shape.type == "flat" else level
+    group = [
+        part
+        for part in select_touching(others, unite_outlines([*beside, shape]))
+        if part.type == "flat" and min(abs(part.translation[2] - z) for z in levels) <= SAME_LEVEL_M
+    ]
+    area = unite_outlines([*group, *replaced, shape])
+    if shape.type == "flat":
+        area = shapely.difference(area, plan, grid_size=OVERLAY_GRID_M)
+    heights = select_heights(roof, shapely.difference(area, plan))
+    base = make_flat(list_polygons(area), shape, heights)
+    if base.pieces:
+        yield [*exclude_parts(others, group), base, shape]
+
+
+def select_heights(roof: PartsRoof, area: shapely.Geometry) -> np.ndarray:
+    """Return the heights (k,) of the points in an area."""
+    return roof.points[shapely.contains_xy(area, *roof.points[:, :2].T), 2]
+
+
+def make_flat(
+    polygons: list[shapely.Polygon], beside: Part, heights: np.ndarray = NO_HEIGHTS
+) -> Part:
+    """Make a flat part over polygons at the median of `heights` (n,).
+
+    Without any, it lies at the eave of the part `beside`, whose direction it has.
+    """
+    level = float(np.median(heights)) if len(heights) else float(beside.translation[2])
+    pieces = tuple(Piece(polygon, np.array([[0.0, 0.0, level]])) for polygon in polygons)
+    if not pieces:
+        return Part("flat", pieces)
+    hull = shapely.convex_hull(shapely.multipolygons(polygons))
+    x, y, kappa, half_width, half_length = outline_rectangle(hull, beside.kappa)
+    size = {"width": 2.0 * half_width, "length": 2.0 * half_length}
+    return Part("flat", pieces, size, float(kappa), np.array([x, y, level]))

@@ -1,0 +1,246 @@
+"""Fit round shapes over arcs of the outline and around the tops of parts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+
+from ...geometry.arrays import compute_median
+from ...geometry.rings import OVERLAY_GRID_M
+from ...model import Part
+from ...primitives.cants import list_cants
+from ...primitives.catalogue import CATALOGUE
+from ...primitives.cone import BROACH_SIDES, HEXAGON_SIDES
+from ...primitives.contract import CX, CY, HALF_LENGTH, HALF_WIDTH, KAPPA, Q0, Q1, Primitive
+from ...primitives.facets import find_apothem
+from ..regular import approach, find_covariance, list_heights
+from .accept import PartsRoof
+from .arcs import APSE_DEG, TURRET_DEG, Arc, cut_to_outline
+from .regions import cut_part, list_polygons
+
+
+class RoundShape(NamedTuple):
+    """How a shape is fitted around a centre.
+
+    `free` are the numbers of its plan that points determine. Over an arc, its sides are `sides`,
+    or many, and the arc is `span_deg` long.
+    """
+
+    free: tuple[int, ...]
+    sides: int | None = None
+    span_deg: tuple[float, float] = (TURRET_DEG, 360.0)
+
+
+ROUND_SHAPES = {
+    "half_cone": RoundShape((), span_deg=APSE_DEG),
+    "cone": RoundShape((CX, CY)),
+    "broach": RoundShape((CX, CY, KAPPA), BROACH_SIDES),
+    "hexagonal_spire": RoundShape((CX, CY, KAPPA), HEXAGON_SIDES),
+    "dome": RoundShape((CX, CY, HALF_WIDTH)),
+    "onion": RoundShape((CX, CY, HALF_WIDTH)),
+}
+RADII = (0.6, 0.9, 1.35, 2.0, 3.0)  # Of discs around a top, in radii of its part's area.
+LEAST_FALL_M = 0.3  # Least fall (m) from the top: less is a level roof.
+CIRCLE_NUMBERS = 3  # A circle has a middle and a radius.
+FEWEST_POINTS = 6  # A slope and a height, and as many points again to check them.
+CENTRE_ROUNDS = 3  # Rounds in which the middle of a disc is found.
+RIDGE = 1e-6  # It keeps what no point determines.
+GROWTH_ROUNDS = 2  # Rounds in which a shape is fitted to all points that follow it.
+FOLLOW_M = 0.12  # Distance (m), at right angles, within which a point follows a slope.
+SLOPES_TRIED, BENDS_TRIED = 24, 7  # Slopes, in equal ratios, and bends of an onion that are tried.
+TURNS_TRIED = 3  # Turns of a spire that are tried within one of its facets.
+TOP_FOLLOW_M = 0.5  # Points so near (m in height) to a steep top lie on it.
+TOP_SEEN = 0.3  # Share of the height of an onion's top that points must reach.
+
+
+def list_arc_shapes(roof: PartsRoof, arc: Arc, names: list[str]) -> Iterator[tuple[Part, int]]:
+    """Yield shapes over an arc, with how many numbers of their plans points give.
+
+    The top of a cone or a dome may lie beside the middle of the arc.
+    """
+    for name in names:
+        row = ROUND_SHAPES.get(name)
+        if row is None or not row.span_deg[0] <= arc.span_deg <= row.span_deg[1]:
+            continue
+        if not (arc.is_round if row.sides is None else arc.sides == row.sides):
+            continue
+        radius = arc.radius * (find_apothem(arc.sides) if row.sides else 1.0)
+        theta = np.array([*arc.centre, arc.facing, radius, radius, 0.0, 0.0, 0.0, 0.0])
+        if name == "half_cone":
+            theta[KAPPA], theta[HALF_LENGTH] = arc.kappa, 0.5 * radius
+            theta[:KAPPA] += 0.5 * radius * arc.way
+        hidden = 2 if arc.span_deg <= APSE_DEG[1] and name != "half_cone" else 0
+        for free in ((), (CX, CY)) if name in ("cone", "dome") else ((),):
+            fitted = fit_followers(roof.points, CATALOGUE[name], theta, free)
+            if fitted is not None:
+                for part in cut_to_outline(fitted, arc, roof.outline):
+                    yield part, len(free) + hidden
+
+
+def list_top_shapes(
+    roof: PartsRoof, part: Part, own: np.ndarray, names: list[str]
+) -> Iterator[tuple[Part, int]]:
+    """Yield round shapes around the top of a part, which is seen at the points `own` (n,)."""
+    start, wide = roof.points[own, :2].mean(axis=0), math.sqrt(part.area / math.pi)
+    for radius in (share * wide for share in RADII):
+        centre, disc = find_centre(roof.points, start, radius)
+        misfit = roof.price_gaps(measure_round_gaps(roof.points[disc], centre)).sum()
+        misfit *= not list_cants(part.parameters)  # Facets are named so, as near as a spire's.
+        if not roof.is_worth(disc, misfit, CIRCLE_NUMBERS):
+            continue
+        theta = np.array([*centre, part.kappa, radius, radius, 0.0, 0.0, 0.0, 0.0])
+        for name in names:
+            shape, free = CATALOGUE[name], ROUND_SHAPES[name].free
+            fitted = fit_followers(roof.points, shape, theta, free, HALF_WIDTH not in free)
+            if fitted is not None:
+                ring = fitted.pieces[0].outline
+                common = shapely.intersection(ring, roof.outline, grid_size=OVERLAY_GRID_M)
+                polygons = list_polygons(common)
+                if polygons:
+                    yield cut_part(fitted, max(polygons, key=lambda p: p.area)), CIRCLE_NUMBERS
+        # The others were fitted to all points that follow them.
+        names = [name for name in names if HALF_WIDTH in ROUND_SHAPES[name].free]
+
+
+def find_centre(
+    points: np.ndarray, centre: np.ndarray, radius: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the middle (2,) of what rises above the rest of a disc of points (n, 3), and which.
+
+    It begins with the disc around a `centre`.
+    """
+    for _ in range(CENTRE_ROUNDS):
+        near = np.hypot(*(points[:, :2] - centre).T) <= radius
+        if not near.any():
+            break
+        above = np.maximum(points[near, 2] - points[near, 2].mean(), 0.01)
+        centre = above @ points[near, :2] / above.sum()
+    return centre, near
+
+
+def measure_round_gaps(points: np.ndarray, centre: np.ndarray) -> np.ndarray:
+    """Return about how far points (n, 3) lie from the nearest round shape or spire.
+
+    Without a fall from the middle there is none.
+    """
+    x, y = (points[:, :2] - centre).T
+    r, turn = np.hypot(x, y), np.arctan2(y, x)
+    sides = (BROACH_SIDES, HEXAGON_SIDES)
+    waves = [r * wave(n * turn) for n in sides for wave in (np.cos, np.sin)]
+    design = np.stack([np.ones_like(r), r, r * r, np.cos(turn), np.sin(turn), *waves])
+    is_near = np.ones(len(r), bool)
+    for _ in range(GROWTH_ROUNDS):
+        some = design[:, is_near]
+        normal = some @ some.T + RIDGE * np.eye(len(some))
+        solution = np.linalg.solve(normal, some @ points[is_near, 2])
+        gaps = np.abs(points[:, 2] - solution @ design)
+        is_near = gaps <= max(LEAST_FALL_M, 2.0 * compute_median(gaps))
+    falls = -r.max() * (solution[1] + solution[2] * r.max()) >= LEAST_FALL_M
+    return gaps if falls else np.full(len(r), np.inf)
+
+
+def fit_followers(
+    points: np.ndarray,
+    shape: Primitive,
+    theta: np.ndarray,
+    free: tuple[int, ...],
+    grows: bool = False,
+) -> Part | None:
+    """Fit a part to the points (n, 3) of the plan of theta (9,) that follow it, None for too few.
+
+    Its heights and the numbers `free` are fitted. What `grows` reaches out to where points leave
+    its slope: they show nothing else of the width of a cone.
+    """
+    from ..likelihood import fit_heights  # compiled code that most roofs never need
+
+    plan = (*free, HALF_LENGTH) if HALF_WIDTH in free else free
+    free, spacing = (*free, *list_heights(shape)), 0.0
+    inside = points[shapely.contains_xy(shape.part(theta).pieces[0].outline, *points[:, :2].T)]
+    turns = np.arange(TURNS_TRIED if KAPPA in plan else 1) * 2.0 * math.pi / len(shape.rim)
+    theta = find_start(inside, shape, theta, turns / TURNS_TRIED)
+    for _ in range(GROWTH_ROUNDS):
+        near = inside[follow(inside, shape, theta, 3.0)]
+        if len(near) < max(FEWEST_POINTS, 2 * len(free)):
+            return None
+        theta, _ = fit_heights(np.column_stack([near, np.ones(len(near))]), shape, theta, plan)
+        if HALF_WIDTH in free:
+            theta[[HALF_WIDTH, HALF_LENGTH]] = theta[[HALF_WIDTH, HALF_LENGTH]].mean()
+        if grows:
+            r = np.hypot(*(points[:, :2] - theta[:2]).T)
+            order = np.argsort(r, kind="stable")
+            score = np.cumsum(np.where(follow(points, shape, theta)[order], 1, -1))
+            last = int(np.argmax(score))
+            theta[[HALF_WIDTH, HALF_LENGTH]] = r[order[last]]
+            inside = points[order[: last + 1]]
+            spacing = r[order[last]] / math.sqrt(last + 1.0)
+    if shape.minima:  # Points on a steep needle lie far off in height.
+        theta = approach(inside, shape.variant(shape.from_theta(theta)[0]), theta, free)[1]
+    part = make_part(inside, shape, theta, free, spacing**2)
+    return part if is_top_seen(part, inside) else None
+
+
+def follow(
+    points: np.ndarray, shape: Primitive, theta: np.ndarray, loose: float = 1.0
+) -> np.ndarray:
+    """Return which points (n, 3) lie near a shape, the steeper it is the farther off in height."""
+    slope = theta[Q1 : Q1 + len(shape.bounds)].sum()
+    reach = loose * FOLLOW_M * math.hypot(1.0, slope)
+    return np.abs(points[:, 2] - shape.height_at(theta, points[:, :2])) <= reach
+
+
+def find_start(
+    points: np.ndarray, shape: Primitive, theta: np.ndarray, turns: np.ndarray
+) -> np.ndarray:
+    """Return theta (9,) with the height, slopes and turn that most points (n, 3) follow."""
+    (lowest, highest), *bends = shape.bounds
+    values = [np.geomspace(lowest, highest, SLOPES_TRIED // (1 + len(bends)))]
+    values += [np.linspace(*bend, BENDS_TRIED) for bend in bends]
+    best, most = theta, 0
+    for turn, *slopes in product(turns, *values):
+        trial = theta.copy()
+        trial[KAPPA] += turn
+        trial[Q1 : Q1 + len(slopes)] = slopes
+        lows = np.sort(points[:, 2] - shape.height_at(trial, points[:, :2]))
+        width = 2.0 * FOLLOW_M * math.hypot(1.0, sum(slopes))
+        counts = np.searchsorted(lows, lows + width, side="right") - np.arange(len(lows))
+        first = int(np.argmax(counts)) if len(counts) else 0
+        if len(counts) and counts[first] > most:
+            most, best = int(counts[first]), trial
+            best[Q0] = float(lows[first : first + most].mean())
+    return best
+
+
+def is_top_seen(part: Part, points: np.ndarray) -> bool:
+    """Return whether points (n, 3) reach far enough up the top of an onion.
+
+    It may be as high as anything above them. Other shapes have no top of their own.
+    """
+    if part.type != "onion":
+        return True
+    height, neck = part.parameters["height"], part.parameters["neck_height"]
+    follows = np.abs(points[:, 2] - part.height_at(points[:, :2])) <= TOP_FOLLOW_M
+    reached = points[follows, 2].max(initial=-np.inf) - part.translation[2]
+    return bool(reached >= neck + TOP_SEEN * (height - neck))
+
+
+def make_part(
+    points: np.ndarray,
+    shape: Primitive,
+    theta: np.ndarray,
+    free: tuple[int, ...],
+    width_variance: float,
+) -> Part:
+    """Make a part of theta (9,), whose numbers `free` were fitted to points (n, 3).
+
+    Its standard deviations follow from these, and from the variance (m2) of half its width.
+    """
+    from ..single import find_deviations  # compiled code that most roofs never need
+
+    variant = shape.variant(shape.from_theta(theta)[0])
+    covariance = find_covariance(points, variant, theta, free, width_variance)
+    return variant.part(theta, find_deviations(variant, theta, covariance))
