@@ -90,7 +90,8 @@ def list_top_shapes(
     for radius in (share * wide for share in RADII):
         centre, disc = find_centre(roof.points, start, radius)
         misfit = roof.price_gaps(measure_round_gaps(roof.points[disc], centre)).sum()
-        misfit *= not list_cants(part.parameters)  # Facets are named so, as near as a spire's.
+        # The facets of a spire are named so, and lie as near. A house may have one cant.
+        misfit *= len(list_cants(part.parameters)) < 2
         if not roof.is_worth(disc, misfit, CIRCLE_NUMBERS):
             continue
         theta = np.array([*centre, part.kappa, radius, radius, 0.0, 0.0, 0.0, 0.0])
