@@ -32,7 +32,6 @@ from .volumes import (
     V0,
     V1,
     compute_roof_heights,
-    is_fixed,
 )
 
 MOST_VOLUMES = 24  # Most volumes that are searched or changed all at once: a limit on time.
@@ -168,7 +167,7 @@ def cut_back_neighbours(volumes, extended, scene, best, lowest, value, surcharge
     """
     last = len(extended) - 1
     for j in range(1, last):
-        if is_fixed(extended, j) or extended[j, DIRECTION] != extended[last, DIRECTION]:
+        if extended[j, DIRECTION] != extended[last, DIRECTION]:
             continue
         if not has_overlap(extended[j], extended[last]):
             continue

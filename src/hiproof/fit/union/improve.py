@@ -25,7 +25,7 @@ from .moves import (
 from .objective import compute_objective
 from .prices import BEGIN_SHARE, BEGIN_UNITS
 from .steps import enclose_volume
-from .volumes import DIRECTION, LEVEL, N_SIDES, OFFSET0, SETTLED, SLOPE0, U0, U1, V0, V1, is_fixed
+from .volumes import DIRECTION, LEVEL, N_SIDES, OFFSET0, SETTLED, SLOPE0, U0, U1, V0, V1
 
 DIGEST_REACH_M = 0.5  # Volumes nearer than this (m) belong to each other's surroundings.
 DIGEST_STEP = 0.02  # Smaller changes of metres and of slopes are none.
@@ -44,7 +44,7 @@ def improve(volumes, scene, value, slopes, rounds):
     for _ in range(rounds):
         value_before = value
         for k in range(len(volumes)):
-            if is_unsettled(volumes, scene.turn, k) or (k == 0 and not is_fixed(volumes, k)):
+            if k == 0 or is_unsettled(volumes, scene.turn, k):
                 context = measure_context(volumes, scene.U, scene.V, scene.order, k)
                 volumes, value = refit_volume(volumes, scene, value, k, context)
         for k in range(1, len(volumes)):
@@ -92,7 +92,7 @@ def drop_base(volumes, scene, value):
 @compiled
 def is_unsettled(volumes, turn, k):
     """Return whether volume k may change, and its surroundings did since the last try."""
-    return not is_fixed(volumes, k) and volumes[k, SETTLED] != digest_surroundings(volumes, turn, k)
+    return volumes[k, SETTLED] != digest_surroundings(volumes, turn, k)
 
 
 @compiled

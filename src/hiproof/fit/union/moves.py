@@ -18,7 +18,7 @@ import numpy as np
 
 from ...compiled import compiled
 from .around import compute_roof_everywhere, compute_roof_with, measure_context
-from .edges import BEYOND_OUTLINE_M, EVERYWHERE, NO_GAIN, move_edges
+from .edges import BEYOND_OUTLINE_M, EVERYWHERE, NO_GAIN, SETTLE_REACH_M, move_edges
 from .objective import compute_objective, compute_objective_with, compute_point_cost
 from .prices import BEGIN_SHARE, BEGIN_UNITS, PARAMETER_COST
 from .refit import refit
@@ -40,7 +40,6 @@ from .volumes import (
     count_slopes,
     equalise_slopes,
     find_lowest,
-    is_fixed,
     is_within,
     measure_run,
     read_coefficients,
@@ -84,8 +83,6 @@ def remove_volume(volumes, k):
 def refit_volumes(volumes, scene, value):
     """Refit every volume once, where that helps."""
     for k in range(len(volumes)):
-        if is_fixed(volumes, k):
-            continue
         context = measure_context(volumes, scene.U, scene.V, scene.order, k)
         volumes, value = refit_volume(volumes, scene, value, k, context)
     return volumes, value
@@ -109,6 +106,14 @@ def settle_volume(volumes, scene, value, k, reach):
     return refit_volume(volumes, scene, value, k, context)
 
 
+def settle_volumes(volumes, scene):
+    """Refit the volumes and move their edges a little on every point of `scene`."""
+    volumes, value = refit_volumes(volumes, scene, compute_objective(volumes, scene, np.inf))
+    for k in range(1, len(volumes)):
+        volumes, value = settle_volume(volumes, scene, value, k, SETTLE_REACH_M)
+    return volumes, value
+
+
 @compiled
 def move_all_edges(volumes, scene, value, reach):
     """Move the edges of every volume, in place."""
@@ -123,10 +128,8 @@ def drop_volumes(volumes, scene, value):
     """Drop volumes that do not pay."""
     k = 1
     while k < len(volumes):
-        trial, trial_value = volumes, np.inf
-        if not is_fixed(volumes, k):
-            trial = remove_volume(volumes, k)
-            trial_value = compute_objective(trial, scene, value - NO_GAIN)
+        trial = remove_volume(volumes, k)
+        trial_value = compute_objective(trial, scene, value - NO_GAIN)
         if trial_value < np.inf:
             volumes, value = trial, trial_value
         else:

@@ -88,12 +88,11 @@ NEW_UNITS, NEW_MOVED_UNITS = 6.0, 1.0
 Of 334 best additions 324 are still found.
 """
 
-LEFT_OUT_UNITS, LEFT_OUT_SHARE = 4.0, 0.1  # leaving a volume out; besides, a share of the points
 CUT_UNITS = 10.0  # cutting a volume short, before its neighbours are drawn out
 
 # How much the points of a place must cost for a volume to be looked for.
 
-ROOF_UNITS, PLACE_UNITS = 5.0, 4.0  # of a roof that explains all but poorly; of one place of a roof
+ROOF_UNITS = 5.0  # of a roof that explains all but poorly
 
 # How nearly two roofs must cost the same to be one, and before the last volume is fitted in.
 SAME_UNITS, SAME_BEFORE_UNITS = 0.1, 2.0

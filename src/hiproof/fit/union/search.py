@@ -10,10 +10,9 @@ import numpy as np
 import shapely
 
 from .allowed import list_allowed_shapes
-from .block import settle_volumes
-from .groups import run_in_groups
 from .grow import grow
-from .large import find_in_windows
+from .large import find_in_blocks
+from .moves import settle_volumes
 from .objective import compute_objective
 from .plan import Plan
 from .prices import LARGE_ROOF_M2, compute_unit_points
@@ -43,15 +42,9 @@ def find_volumes(
     )
     # Otherwise, the search of a house uses every point.
     if outline.area > LARGE_ROOF_M2 and count > SEARCH_POINTS:
-        volumes = find_in_windows(plan, outline, full_scene)
-        volumes = run_in_groups(trim_hidden, volumes, full_scene, plan, outline)
+        volumes = find_in_blocks(plan, outline, full_scene)
         return volumes, compute_objective(volumes, full_scene, np.inf), full_scene
     scene = thin_scene(full_scene, numbers, evidence[0])
     volumes, _ = grow(scene)
     volumes, value = settle_volumes(volumes, full_scene)
     return *trim(volumes, full_scene, value), full_scene
-
-
-def trim_hidden(volumes: np.ndarray, scene: Scene) -> np.ndarray:
-    """Draw hidden edges in."""
-    return trim(volumes, scene, compute_objective(volumes, scene, np.inf))[0]

@@ -21,8 +21,6 @@ from .volumes import (
     V0,
     V1,
     compute_roof_heights,
-    is_fixed,
-    list_movable,
 )
 
 HIDDEN_M = 0.35  # Edges that are hidden by more (m) are drawn in.
@@ -40,14 +38,11 @@ def trim(volumes: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray, f
 
     Edges are drawn in to what is visible of each volume. Also returns the objective.
     """
-    volumes, value = draw_out(volumes, scene, value, list_movable(volumes))
+    volumes, value = draw_out(volumes, scene, value, np.arange(1, len(volumes)))
     U, V = list_nodes(scene)
     _, top = compute_roof_heights(volumes, U, V, UNSORTED)
     k = 1
     for number in range(1, len(volumes)):
-        if is_fixed(volumes, k):
-            k += 1
-            continue
         visible = top == number
         if not visible.any():
             trial = remove_volume(volumes, k)
@@ -112,7 +107,8 @@ def list_around(volumes: np.ndarray, k: int, scene: Scene) -> np.ndarray:
     wide[k, [U0, V0]] -= NEAR_VERTEX_M
     wide[k, [U1, V1]] += NEAR_VERTEX_M
     neighbours = list_near(wide, scene.turn, -1)[k]
-    return np.intersect1d(neighbours[1 : 1 + neighbours[0]], list_movable(volumes))
+    around = neighbours[1 : 1 + neighbours[0]]
+    return np.sort(around[around > 0])
 
 
 def draw_in(

@@ -30,13 +30,8 @@ REPLACES = 15  # Column that says whether it replaces what lies below.
 # First column of the leans: plane k is z = offset + slope (x + lean y) with x = u, -u, v, -v and y
 # the other of u, v.
 LEAN0 = 16
-# Column: a digest of the surroundings in which no move was found for it, infinite where it is
-# fixed.
-SETTLED = 20
-# Column: its number among the whole roof's volumes while a window of it is searched, 0 for a new
-# volume.
-ROW_NUMBER = 21
-COLUMNS = 22  # Number of columns of a row.
+SETTLED = 20  # Column: a digest of the surroundings in which no move was found for it.
+COLUMNS = 21  # Number of columns of a row.
 N_SIDES = 4  # Number of planes that slope.
 N_PLANES = 5  # Number of all planes.
 LEVEL = 4  # Number of the level plane.
@@ -86,17 +81,6 @@ def read_coefficients(volumes, k):
 def read_rectangle(volumes, k):
     """Return where volume k begins and ends along u and along v."""
     return volumes[k, 1], volumes[k, 2], volumes[k, 3], volumes[k, 4]
-
-
-@compiled
-def is_fixed(volumes, k):
-    """Return whether no move may change volume k: it reaches out of the search window."""
-    return volumes[k, SETTLED] == np.inf
-
-
-def list_movable(volumes: np.ndarray) -> np.ndarray:
-    """Return the numbers of the volumes but the base that moves may change."""
-    return 1 + np.nonzero(volumes[1:, SETTLED] < np.inf)[0]
 
 
 @compiled

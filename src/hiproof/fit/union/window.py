@@ -1,31 +1,25 @@
-"""Open windows on a large roof: scenes of a box, and changes in it.
+"""Open windows on a large roof: scenes of a box.
 
-A window holds a bounded number of points, spread over all heights, grid lines and unobserved cells
-of its own, and all volumes that reach into it. What reaches out of it stays as it was. Steps along
-its border cost nothing.
+A window holds a bounded number of points, spread over all heights, and grid lines and unobserved
+cells of its own. Steps along its border cost nothing.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection
 
 import numpy as np
 import shapely
 
 from ..shapes.regions import list_polygons
 from . import plan as plans
-from .box import Box, clip_to_box, enclose_boxes
-from .edges import NO_GAIN
-from .objective import compute_objective
+from .box import Box, clip_to_box
 from .planes import Cloud, Grid
 from .scene import Scene, find_leans, pad_rows, sort_along
-from .volumes import DIRECTION, ROW_NUMBER, SETTLED, U0
+from .volumes import DIRECTION, U0
 from .whole import Whole
 
 MOST_WINDOW_CELLS = 40  # Most cells a side of a window. Of a larger one they are wider.
-
-Operation = Callable[[np.ndarray, Scene, float], tuple[np.ndarray, float]]
 
 
 def open_window(whole: Whole, box: Box, most_points: int) -> Scene | None:
@@ -131,74 +125,6 @@ def cut_depth_raster(scene: Scene, box: Box) -> tuple[np.ndarray, tuple[float, f
     return np.ascontiguousarray(depth), (low_u + i0 * p, low_v + j0 * p)
 
 
-def change_in_window(
-    whole: Whole,
-    box: Box,
-    most_points: int,
-    operation: Operation,
-    movable: Collection[int] | None = None,
-) -> bool:
-    """Change the volumes that reach into a box, if that lowers the objective there.
-
-    Returns whether it did. Volumes that reach out of the box, and those that are not `movable`,
-    return as they were. New volumes end where the box does. If they reach beyond it (in other
-    directions), the objective of the larger box has to fall, too.
-    """
-    numbers = whole.list_volumes(box)
-    scene = open_window(whole, box, most_points)
-    if scene is None:
-        return False
-    fixed = list_fixed_volumes(whole, box, numbers, movable)
-    rows = whole.volumes[[0, *numbers]]
-    rows[np.isin([0, *numbers], [0, *fixed]), SETTLED] = np.inf
-    value_before = compute_objective(rows, scene, np.inf)
-    new_rows, value = operation(rows, scene, value_before)
-    if value >= value_before - NO_GAIN:
-        return False
-    new_rows = forget_digests(restore_volumes(new_rows, whole.volumes, fixed))
-    changed = ~np.isin(new_rows[:, ROW_NUMBER], fixed)
-    changed[0] = False
-    new_rows[changed] = end_at_border(whole, new_rows[changed], box)
-    if compute_objective(new_rows, scene, value_before - NO_GAIN) == np.inf:
-        return False
-    extents = [whole.find_extent(row) for row in new_rows[changed]]
-    boxes_beyond = [e for e in extents if e.u0 <= e.u1 and not box.contains(e)]
-    if boxes_beyond and not is_lower_beyond(
-        whole, enclose_boxes([box, *boxes_beyond]), numbers, new_rows[1:], most_points
-    ):
-        return False
-    whole.replace(numbers, new_rows[1:])
-    return True
-
-
-def list_fixed_volumes(
-    whole: Whole, box: Box, numbers: list[int], movable: Collection[int] | None
-) -> list[int]:
-    """List which of the volumes `numbers` a window may not change."""
-    reach_out = [k for k in numbers if not box.contains(Box(*whole.boxes[k]))]
-    return (
-        reach_out
-        if movable is None
-        else sorted({*reach_out, *(k for k in numbers if k not in movable)})
-    )
-
-
-def restore_volumes(rows: np.ndarray, volumes: np.ndarray, fixed: list[int]) -> np.ndarray:
-    """Return the volumes `rows` with those numbered `fixed` as they were, each once.
-
-    They are restored from `volumes`.
-    """
-    for k in fixed:
-        matches = np.flatnonzero(rows[1:, ROW_NUMBER] == k) + 1
-        if len(matches):
-            rows[matches[0]] = volumes[k]
-            rows = np.delete(rows, matches[1:], axis=0)
-        else:
-            highest = np.maximum.accumulate(rows[:, ROW_NUMBER])
-            rows = np.insert(rows, max(int(np.searchsorted(highest, k)), 1), volumes[k], axis=0)
-    return rows
-
-
 def end_at_border(whole: Whole, rows: np.ndarray, box: Box) -> np.ndarray:
     """Let volumes of the first direction end where a window does.
 
@@ -211,31 +137,3 @@ def end_at_border(whole: Whole, rows: np.ndarray, box: Box) -> np.ndarray:
         limit = np.maximum if side % 2 == 0 else np.minimum
         rows[is_aligned, U0 + side] = limit(rows[is_aligned, U0 + side], box[side])
     return rows
-
-
-def is_lower_beyond(
-    whole: Whole, box: Box, numbers: list[int], rows: np.ndarray, most_points: int
-) -> bool:
-    """Return whether `rows` lower the objective of a larger box, too.
-
-    The volumes have these `numbers`.
-    """
-    scene = open_window(whole, box, 2 * most_points)
-    if scene is None:
-        return False
-    saved = whole.volumes, whole.boxes
-    value_before = compute_objective(whole.select_rows(box), scene, np.inf)
-    whole.replace(numbers, rows)
-    lower = compute_objective(whole.select_rows(box), scene, value_before - NO_GAIN) < np.inf
-    whole.set_volumes(*saved)
-    return lower
-
-
-def forget_digests(volumes: np.ndarray) -> np.ndarray:
-    """Return the volumes without the digests of their surroundings.
-
-    What a window knows of them does not hold outside it.
-    """
-    volumes = volumes.copy()
-    volumes[:, SETTLED] = 0.0
-    return volumes
