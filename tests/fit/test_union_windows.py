@@ -1,4 +1,4 @@
-"""Check that large roofs are searched in windows, and far parts do not matter."""
+"""Check that large roofs are searched block by block, and far parts do not matter."""
 
 import numpy as np
 import pytest
@@ -9,10 +9,8 @@ from hiproof.compose import check_solid
 from hiproof.fit.roof import fit_building
 from hiproof.fit.union.allowed import list_allowed_shapes
 from hiproof.fit.union.blocks import BLOCK_M2, HeightRaster, find_cheapest_cut
-from hiproof.fit.union.box import EMPTY_BOX
 from hiproof.fit.union.plan import lay_out_plan
 from hiproof.fit.union.scene import find_directions, make_scene
-from hiproof.fit.union.volumes import U0, V1
 from hiproof.fit.union.whole import Whole
 from hiproof.status import Status
 from points_of_roofs import sample_heights
@@ -107,15 +105,6 @@ def test_a_cut_falls_on_a_step_and_blocks_are_small():
     step = whole.plan.frame.to_plan(np.array([[8.0, 7.5, 6.0]]))[0]
     assert whole.area > BLOCK_M2
     assert positions == pytest.approx(step[axis], abs=2 * raster.pitch)
-
-
-def test_a_volume_without_width_lies_nowhere():
-    whole = make_whole(compute_hall, HALL)
-    line = whole.volumes[0].copy()
-    line[U0 : V1 + 1] = 3.0, 9.0, 4.0, 4.0
-    whole.set_volumes(np.vstack([whole.volumes, line]))
-    assert whole.boxes[1].tolist() == list(EMPTY_BOX)
-    assert whole.list_volumes(whole.box) == []
 
 
 def test_equal_levels_of_a_long_row_are_equal_everywhere():

@@ -23,15 +23,10 @@ improve     compiled: all moves in turn
 add, grow   volumes added one by one to a level base, and the first of them grown anew
 trim        hidden edges drawn in
 search      these in order, and the simplification that a draughtsman would make
-large       roofs of more than 200 m2, searched in windows of bounded size
-box         upright boxes in the plan's axes
-whole       what windows need of a whole roof
-window      the scene of a box, and how changes in it return to the roof
+large       roofs of more than 200 m2, each block of which is searched as a house
+whole       what blocks need of a whole roof
+window      the scene of a box
 blocks      where a large roof is cut
-block       the search of one block as a house
-seams       the blocks joined again
-places      further growth where points are unexplained
-groups      a pass over groups of neighbouring volumes
 sides       each side on the line of the outline that it nearly follows
 fit         the outcome
 """

@@ -10,8 +10,7 @@ import math
 
 import numpy as np
 
-from .box import Box
-from .whole import Whole
+from .whole import Box, Whole
 
 # Largest area of outline in a block (m2). Blocks of 400 m2 cut saw-tooth halls through their teeth
 # (17 of 20 right at 5 points/m2, all with 600), and Vienna has 81.8 % of its edges instead of 83.2.

@@ -9,7 +9,6 @@ import numpy as np
 import shapely
 
 from .blocks import BLOCK_M2, HeightRaster, find_cheapest_cut
-from .box import Box, clip_to_box
 from .candidates import Effort
 from .grow import grow
 from .moves import settle_volumes
@@ -18,7 +17,7 @@ from .plan import Plan
 from .scene import Scene
 from .trim import trim
 from .volumes import U0, V1, compute_roof_heights, make_base
-from .whole import Whole
+from .whole import Box, Whole, clip_to_box
 from .window import end_at_border, open_window
 
 # Points of a block in which structure is searched: 2.7 per square metre of the largest block. With
@@ -50,7 +49,7 @@ def find_in_blocks(plan: Plan, outline: shapely.Polygon, scene: Scene) -> np.nda
 def search_box(whole: Whole, raster: HeightRaster, box: Box, area_m2: float) -> list[np.ndarray]:
     """Return the volumes of each block of a box that holds so much of the outline."""
     cut = find_cheapest_cut(raster, box) if area_m2 > BLOCK_M2 else None
-    halves = box.split(*cut) if cut else (box, box)
+    halves = box.split(cut[0], find_step(whole, box, *cut, raster.pitch)) if cut else (box, box)
     areas = [clip_to_box(whole.outline, half).area for half in halves]
     if cut is None or min(areas) < LEAST_HALF_M2:
         return list_block_volumes(whole, box)
@@ -59,6 +58,25 @@ def search_box(whole: Whole, raster: HeightRaster, box: Box, area_m2: float) -> 
         for half, area in zip(halves, areas, strict=True)
         for volumes in search_box(whole, raster, half, area)
     ]
+
+
+def find_step(whole: Whole, box: Box, axis: int, place: float, pitch: float) -> float:
+    """Return where within two cells of a cut, at a `place` of an axis, heights change most.
+
+    The squares of heights about their means on both sides have the least sum there.
+    """
+    strip = box.split(axis, place + 2 * pitch)[0].split(axis, place - 2 * pitch)[1]
+    numbers = whole.find_points(strip)
+    x = (whole.u, whole.v)[axis][numbers]
+    order = np.argsort(x, kind="stable")
+    x, z = x[order], whole.z[numbers[order]]
+    if len(x) < 2:
+        return place
+    before = np.arange(1, len(x))
+    sums = np.cumsum(z)[:-1]
+    spread = sums**2 / before + (z.sum() - sums) ** 2 / (len(x) - before)
+    q = int(np.argmax(spread))
+    return float(0.5 * (x[q] + x[q + 1]))
 
 
 def list_block_volumes(whole: Whole, box: Box) -> list[np.ndarray]:

@@ -18,7 +18,7 @@ COMMON_HOUSE_M2 = 60.0  # Larger roofs, up to LARGE_ROOF_M2, ask more of each vo
 LARGE_ROOF_M2 = 200.0
 """Area (m2) from which on the price of structure does not depend on a roof's size.
 
-Larger roofs are searched in windows.
+Larger roofs are searched block by block.
 """
 
 LARGE_ROOF_POINTS = 1.77

@@ -2,12 +2,33 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import shapely
 
-from .box import Box, measure_box
 from .plan import Plan
 from .scene import Scene
+
+
+class Box(NamedTuple):
+    """An upright box in the plan's axes, from u0 to u1 and from v0 to v1 (m)."""
+
+    u0: float
+    u1: float
+    v0: float
+    v1: float
+
+    def split(self, axis: int, place: float) -> tuple[Box, Box]:
+        """Cut the box in two at a `place` of an axis (0 for u, 1 for v)."""
+        if axis == 0:
+            return self._replace(u1=place), self._replace(u0=place)
+        return self._replace(v1=place), self._replace(v0=place)
+
+
+def clip_to_box(geometry: shapely.Geometry, box: Box) -> shapely.Geometry:
+    """Return the part of a geometry inside a box."""
+    return shapely.clip_by_rect(geometry, box.u0, box.v0, box.u1, box.v1)
 
 
 class Whole:
@@ -25,7 +46,8 @@ class Whole:
         self.outline = shapely.transform(
             outline, lambda xy: (xy - plan.frame.origin[:2]) @ plan.frame.rotation.T
         )
-        self.box, self.area = measure_box(self.outline), outline.area
+        u0, v0, u1, v1 = self.outline.bounds
+        self.box, self.area = Box(u0, u1, v0, v1), outline.area
 
     def find_points(self, box: Box) -> np.ndarray:
         """Return the numbers (m,) of the points in a box, among those sorted by u."""

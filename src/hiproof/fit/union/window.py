@@ -13,11 +13,10 @@ import shapely
 
 from ..shapes.regions import list_polygons
 from . import plan as plans
-from .box import Box, clip_to_box
 from .planes import Cloud, Grid
 from .scene import Scene, find_leans, pad_rows, sort_along
 from .volumes import DIRECTION, U0
-from .whole import Whole
+from .whole import Box, Whole, clip_to_box
 
 MOST_WINDOW_CELLS = 40  # Most cells a side of a window. Of a larger one they are wider.
 
