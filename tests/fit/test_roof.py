@@ -5,8 +5,8 @@ import pytest
 import shapely
 
 from hiproof.fit.prices import compute_unit
-from hiproof.fit.roof import fit_building, start_roof
-from hiproof.fit.roof.accept import fit_roof, improve, make_known, try_move
+from hiproof.fit.roof import fit_building, improve_all, start_roof
+from hiproof.fit.roof.accept import fit_roof, make_known, try_move
 from hiproof.fit.roof.draw import (
     compute_height,
     compute_heights,
@@ -138,7 +138,7 @@ def test_heights_at_once_are_the_heights_one_by_one(kind):
 def test_improving_a_roof_never_makes_it_dearer(kind):
     start, site, _, search = begin_roof(kind)
     roof = start_roof(*search)
-    improve(roof, make_tables_like(roof), site, make_drawing(len(roof.sides)))
+    improve_all(roof, make_tables_like(roof), site, make_drawing(len(roof.sides)))
     assert price(roof, site) <= price(start, site)
 
 

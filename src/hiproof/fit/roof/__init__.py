@@ -11,6 +11,7 @@ moves       compiled: moves of a roof, which propose and do not judge
 accept      compiled: the one place that judges, and the loop
 site        what a roof has to explain: points, cells, the outline and its lines
 start       the tables of the volumes that the search found
+add         volumes added where points of a large roof are unexplained
 beside      how far the points lie beside the outline
 deviations  compiled: how well points determine unknowns and sides
 regions     which polygons each volume roofs
@@ -42,13 +43,16 @@ from ..union.fit import BuildingFit
 from ..union.objective import is_base_visible
 from ..union.outline import draw_outline
 from ..union.plan import Plan, lay_out_plan
+from ..union.prices import LARGE_ROOF_M2
 from ..union.scene import VISIBLE_DEPTH_M, Scene, place_nodes
 from ..union.search import find_volumes
 from ..union.sides import choose_sides, gather_lines
-from .accept import improve
+from ..union.whole import Whole
+from .accept import LOOP_ROUNDS, improve
+from .add import add_volumes
 from .beside import estimate_shift
 from .deviations import estimate_covariance, estimate_side_sigmas, find_anchored
-from .draw import draw_whole_roof, make_drawing
+from .draw import Drawing, draw_whole_roof, make_drawing
 from .names import cut_sides, find_axes, read_planes, read_sides
 from .parts import name_planes
 from .price import Site
@@ -117,25 +121,32 @@ def name_volumes(
     keeps_shapes = bool(types) and not {*CATALOGUE} <= {*types, *CURVED}
     site = make_site(scene, plan_outline, unit, plan.border, keeps_shapes)
     roof = start_roof(volumes, outline, plan, scene)
-    roof, site = improve_beside(roof, site)
+    roof, site = improve_beside(roof, site, Whole(scene, plan, outline))
     return read_parts(roof, site, plan_outline, plan, types)
 
 
-def improve_beside(roof: Tables, site: Site) -> tuple[Tables, Site]:
+def improve_beside(roof: Tables, site: Site, whole: Whole) -> tuple[Tables, Site]:
     """Improve a roof, also with its points moved to where its eaves are level, if that is cheaper.
 
-    Returns the roof and the site that it explains.
+    Volumes are added to large roofs. Returns the roof and the site that it explains.
     """
     trial, drawing = make_tables_like(roof), make_drawing(len(roof.sides))
-    cost = improve(roof, trial, site, drawing)
+    cost = improve_all(roof, trial, site, drawing)
+    if whole.area > LARGE_ROOF_M2 and add_volumes(roof, trial, site, drawing, whole):
+        cost = improve_all(roof, trial, site, drawing)
     shift = estimate_shift(roof, site)
     if not shift.any():
         return roof, site
     moved = site._replace(x=site.x - shift[0], y=site.y - shift[1])
     other = make_tables_like(roof)
     copy_tables(roof, other)
-    other_cost = improve(other, trial, moved, drawing) + 2 * UNKNOWN_UNITS * site.unit
+    other_cost = improve_all(other, trial, moved, drawing) + 2 * UNKNOWN_UNITS * site.unit
     return (other, moved) if other_cost < cost else (roof, site)
+
+
+def improve_all(roof: Tables, trial: Tables, site: Site, drawing: Drawing) -> float:
+    """Improve all volumes of a roof until no move saves. Returns its price (points)."""
+    return improve(roof, trial, site, drawing, np.ones(len(roof.sides), np.bool_), LOOP_ROUNDS)
 
 
 def start_roof(volumes: np.ndarray, outline: shapely.Polygon, plan: Plan, scene: Scene) -> Tables:

@@ -176,14 +176,17 @@ def fit_roof(roof, site, rounds):
 
 
 @compiled
-def improve(roof, trial, site, drawing):
-    """Improve a roof by moves until none saves. Returns its price (points)."""
+def improve(roof, trial, site, drawing, asked, rounds):
+    """Improve a roof by moves that concern volumes `asked` (v,), until none saves.
+
+    Returns its price (points).
+    """
     known = make_known()
     size = len(roof.sides)
-    asked, changed, box = np.ones(size, np.bool_), np.zeros(size, np.bool_), np.empty(4)
+    changed, box = np.zeros(size, np.bool_), np.empty(4)
     touched = np.zeros(size, np.bool_)
     moves, gains = np.empty((MOST_MOVES, MOVE_COLUMNS), np.int64), np.empty(MOST_MOVES)
-    for _ in range(LOOP_ROUNDS):
+    for _ in range(rounds):
         fit_roof(roof, site, FIT_ROUNDS)
         known.boxes[:] = np.nan
         count = list_moves(roof, site, asked, moves)

@@ -15,18 +15,24 @@ from ..union.volumes import (
     SLOPE0,
     TIE,
 )
+from .moves import LINE_COSINE
+from .price import Site
 from .tables import (
     FAR_M,
+    N_SIDES,
     NO_UNKNOWN,
+    VOLUME_COUNT,
     Tables,
     add_line,
     add_plane,
     add_unknown,
     make_tables,
-    place_volumes,
+    measure_middle,
+    place_volume,
 )
 
 ROOM = 2  # Room for so many times the volumes that there are.
+NEAR_WALL_M = 0.4  # A line of the outline so near (m) a new volume's side is that side.
 
 
 def make_roof(volumes: np.ndarray, sides: list, turns: np.ndarray, with_base: bool) -> Tables:
@@ -34,19 +40,40 @@ def make_roof(volumes: np.ndarray, sides: list, turns: np.ndarray, with_base: bo
     numbers = [k for k in range(len(volumes)) if k > 0 or with_base or len(volumes) == 1]
     size = ROOM * len(numbers) + 8
     roof = make_tables(size, 8 * size, 8 * size)
-    for row, k in enumerate(numbers):
-        roof.counts[0] += 1
-        roof.replaces[row] = volumes[k, REPLACES] > 0
-        c, s = turns[int(volumes[k, DIRECTION])]
-        axes = np.array([[c, s], [-s, c]])
-        for edge, side in enumerate(sides[k]):
-            line = np.array([1.0, -side.lean, -side.offset])
-            line *= (1.0 if edge % 2 == 0 else -1.0) / np.hypot(1.0, side.lean)
-            normal = line[:2] if edge < 2 else line[1::-1]
-            roof.sides[row, edge] = add_line(roof, *(normal @ axes), line[2])
-        add_planes(roof, row, volumes[k], sides[k], axes)
-    place_volumes(roof)
+    for k in numbers:
+        add_volume(roof, volumes[k], sides[k], turns)
     return roof
+
+
+def add_volume(roof: Tables, volume: np.ndarray, sides: list, turns: np.ndarray) -> int:
+    """Add a volume along its `sides`. Returns its number."""
+    row = int(roof.counts[VOLUME_COUNT])
+    roof.counts[VOLUME_COUNT] += 1
+    roof.replaces[row], roof.n_planes[row] = volume[REPLACES] > 0, 0
+    c, s = turns[int(volume[DIRECTION])]
+    axes = np.array([[c, s], [-s, c]])
+    for edge, side in enumerate(sides):
+        line = np.array([1.0, -side.lean, -side.offset])
+        line *= (1.0 if edge % 2 == 0 else -1.0) / np.hypot(1.0, side.lean)
+        normal = line[:2] if edge < 2 else line[1::-1]
+        roof.sides[row, edge] = add_line(roof, *(normal @ axes), line[2])
+    add_planes(roof, row, volume, sides, axes)
+    place_volume(roof, row)
+    return row
+
+
+def put_on_walls(roof: Tables, k: int, site: Site) -> None:
+    """Put the sides of volume k on lines of the outline that lie near them."""
+    for s in range(N_SIDES):
+        x, y, length = measure_middle(roof, k, s, site.bounds)
+        cosine = site.lines[:, :2] @ roof.half_planes[k, s, :2]
+        gap = np.abs(site.lines[:, :3] @ [x, y, 1.0])
+        gap[np.abs(cosine) < LINE_COSINE] = np.inf
+        m = int(np.argmin(gap)) if len(gap) and length > 0.0 else -1
+        if m >= 0 and gap[m] < NEAR_WALL_M:
+            sign = 1.0 if cosine[m] > 0.0 else -1.0
+            roof.sides[k, s] = add_line(roof, *(sign * site.lines[m, :3]))
+    place_volume(roof, k)
 
 
 def add_planes(roof: Tables, row: int, volume: np.ndarray, sides: list, axes: np.ndarray) -> None:

@@ -1,0 +1,122 @@
+"""Add volumes where a large roof leaves points unexplained.
+
+Its blocks are searched with some of their points. Where many are unexplained, planes are found
+again among these, each with the rectangle in which it gains most. A new volume joins the others or
+replaces them. It is kept if the roof with it, improved, is cheaper.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..union.add import FEWEST_UNEXPLAINED, UNEXPLAINED
+from ..union.candidates import (
+    MOST_NEW_PLANES,
+    Effort,
+    find_best_rectangles,
+    list_candidates,
+    make_grids,
+)
+from ..union.objective import compute_costs
+from ..union.plan import find_cells
+from ..union.scene import Scene
+from ..union.sides import Side
+from ..union.volumes import DIRECTION, REPLACES
+from ..union.whole import Box, Whole
+from ..union.window import open_window
+from .accept import LEAST_UNITS, improve
+from .draw import Drawing, compute_heights
+from .price import OVER_M, Site
+from .start import add_volume, put_on_walls
+from .tables import VOLUME_COUNT, Tables, copy_tables, has_room, make_tables_like
+
+SQUARE_M = 3.0  # Size (m) of a square in which unexplained points are counted.
+AROUND = 2  # Squares around one that count, too.
+PLACE_UNITS = 4.0  # Units that the points must be worth that a place leaves unexplained.
+WINDOW_M = 20.0  # Size (m) of a place's window.
+EFFORT = Effort(pool_points=1200, seeds=200, regrown=0)
+TRIED = 2  # Candidates that join, and that replace, those that gain most.
+ROUNDS = 2  # Rounds of a new volume's moves before it is judged.
+
+
+def add_volumes(roof: Tables, trial: Tables, site: Site, drawing: Drawing, whole: Whole) -> bool:
+    """Add volumes to a roof at each place where that saves. Returns whether any was added."""
+    has_added = False
+    for box in list_places(roof, site):
+        scene = open_window(whole, box, EFFORT.pool_points)
+        while scene is not None and add_best(roof, trial, site, drawing, scene):
+            has_added = True
+    return has_added
+
+
+def list_places(roof: Tables, site: Site) -> Iterator[Box]:
+    """Yield windows on the places of a roof that leave most points unexplained, the most first."""
+    x, y, z = (column[: site.n] for column in (site.x, site.y, site.z))
+    is_far = np.abs(find_heights(roof, x, y) - z) > site.dead + site.width
+    i = ((x - site.bounds[0]) / SQUARE_M).astype(int).clip(0)
+    j = ((y - site.bounds[2]) / SQUARE_M).astype(int).clip(0)
+    counts = np.zeros((i.max() + 1 + 2 * AROUND, j.max() + 1 + 2 * AROUND))
+    np.add.at(counts, (i[is_far] + AROUND, j[is_far] + AROUND), 1.0)
+    size, half = 2 * AROUND + 1, 0.5 * WINDOW_M
+    while True:
+        sums = np.lib.stride_tricks.sliding_window_view(counts, (size, size)).sum(axis=(2, 3))
+        a, b = np.unravel_index(int(sums.argmax()), sums.shape)
+        if sums[a, b] < PLACE_UNITS * site.unit:
+            return
+        u, v = site.bounds[0] + (a + 0.5) * SQUARE_M, site.bounds[2] + (b + 0.5) * SQUARE_M
+        yield Box(u - half, u + half, v - half, v + half)
+        counts[a : a + size, b : b + size] = 0.0
+
+
+def add_best(roof: Tables, trial: Tables, site: Site, drawing: Drawing, scene: Scene) -> bool:
+    """Add the volume that saves most in a window. Returns whether one does."""
+    nobody = np.zeros(len(roof.sides), np.bool_)
+    lowest = improve(roof, trial, site, drawing, nobody, 1) - LEAST_UNITS * site.unit
+    best, new = None, make_tables_like(roof)
+    for volume, ends in list_additions(roof, scene):
+        copy_tables(roof, new)
+        if not has_room(new):
+            break
+        k = add_volume(new, volume, [Side(end) for end in ends], scene.turn)
+        put_on_walls(new, k, site)
+        asked = nobody.copy()
+        asked[k] = True
+        cost = improve(new, trial, site, drawing, asked, ROUNDS)
+        if cost < lowest:
+            best, new, lowest = new, make_tables_like(roof), cost
+    if best is not None:
+        copy_tables(best, roof)
+    return best is not None
+
+
+def list_additions(roof: Tables, scene: Scene) -> Iterator[tuple[np.ndarray, list[float]]]:
+    """Yield volumes that may explain what a roof leaves, and their ends."""
+    z = find_heights(roof, scene.U[0], scene.V[0])
+    costs = compute_costs(z, scene)
+    unexplained = np.flatnonzero(costs[: scene.n] > UNEXPLAINED)
+    if len(unexplained) < FEWEST_UNEXPLAINED:
+        return
+    candidates = list_candidates(scene, unexplained, MOST_NEW_PLANES, EFFORT)
+    cells = [
+        np.array(
+            [find_cells(grid[axis], x) for grid, x in zip(make_grids(scene), places, strict=True)]
+        )
+        for axis, places in enumerate((scene.U, scene.V))
+    ]
+    for replaces in (False, True):
+        gains, rectangles = find_best_rectangles(scene, candidates, *cells, costs, z, replaces)
+        candidates[:, REPLACES] = replaces
+        for m in np.argsort(-gains, kind="stable")[:TRIED].tolist():
+            if gains[m] > 0.0:
+                lines = scene.lines[int(candidates[m, DIRECTION])]
+                yield candidates[m], [float(lines[k // 2, rectangles[m, k]]) for k in range(4)]
+
+
+def find_heights(roof: Tables, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Return the heights (n,) of a roof at places x, y (n,)."""
+    heights, volumes = np.empty(len(x)), np.empty(len(x), np.int64)
+    view = np.arange(roof.counts[VOLUME_COUNT])
+    compute_heights(roof, view, x, y, OVER_M, heights, volumes)
+    return heights
