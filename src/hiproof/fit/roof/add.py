@@ -30,7 +30,7 @@ from .accept import LEAST_UNITS, improve
 from .draw import Drawing, compute_heights
 from .price import OVER_M, Site
 from .start import add_volume, put_on_walls
-from .tables import VOLUME_COUNT, Tables, copy_tables, has_room, make_tables_like
+from .tables import VOLUME_COUNT, Tables, copy_tables, make_tables_like
 
 SQUARE_M = 3.0  # Size (m) of a square in which unexplained points are counted.
 AROUND = 2  # Squares around one that count, too.
@@ -38,6 +38,7 @@ PLACE_UNITS = 4.0  # Units that the points must be worth that a place leaves une
 WINDOW_M = 20.0  # Size (m) of a place's window.
 EFFORT = Effort(pool_points=1200, seeds=200, regrown=0)
 TRIED = 2  # Candidates that join, and that replace, those that gain most.
+ROWS = np.array([1, 16, 16])  # Most volumes, lines and unknowns that a new volume takes.
 ROUNDS = 2  # Rounds of a new volume's moves before it is judged.
 
 
@@ -72,13 +73,13 @@ def list_places(roof: Tables, site: Site) -> Iterator[Box]:
 
 def add_best(roof: Tables, trial: Tables, site: Site, drawing: Drawing, scene: Scene) -> bool:
     """Add the volume that saves most in a window. Returns whether one does."""
+    if (roof.counts + ROWS > [len(roof.sides), len(roof.lines), len(roof.values)]).any():
+        return False
     nobody = np.zeros(len(roof.sides), np.bool_)
     lowest = improve(roof, trial, site, drawing, nobody, 1) - LEAST_UNITS * site.unit
     best, new = None, make_tables_like(roof)
     for volume, ends in list_additions(roof, scene):
         copy_tables(roof, new)
-        if not has_room(new):
-            break
         k = add_volume(new, volume, [Side(end) for end in ends], scene.turn)
         put_on_walls(new, k, site)
         asked = nobody.copy()
