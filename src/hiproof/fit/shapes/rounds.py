@@ -89,6 +89,8 @@ def list_top_shapes(
     start, wide = roof.points[own, :2].mean(axis=0), math.sqrt(part.area / math.pi)
     for radius in (share * wide for share in RADII):
         centre, disc = find_centre(roof.points, start, radius)
+        if not roof.is_worth(disc, 0.0, CIRCLE_NUMBERS):
+            continue
         misfit = roof.price_gaps(measure_round_gaps(roof.points[disc], centre)).sum()
         # The facets of a spire are named so, and lie as near. A house may have one cant.
         misfit *= len(list_cants(part.parameters)) < 2
