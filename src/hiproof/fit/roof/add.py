@@ -34,6 +34,7 @@ from .tables import VOLUME_COUNT, Tables, copy_tables, make_tables_like
 
 SQUARE_M = 3.0  # Size (m) of a square in which unexplained points are counted.
 AROUND = 2  # Squares around one that count, too.
+MOST_PLACES = 10  # Most places of a roof that are tried: a limit on time.
 PLACE_UNITS = 4.0  # Units that the points must be worth that a place leaves unexplained.
 WINDOW_M = 20.0  # Size (m) of a place's window.
 EFFORT = Effort(pool_points=1200, seeds=200, regrown=0)
@@ -61,7 +62,7 @@ def list_places(roof: Tables, site: Site) -> Iterator[Box]:
     counts = np.zeros((i.max() + 1 + 2 * AROUND, j.max() + 1 + 2 * AROUND))
     np.add.at(counts, (i[is_far] + AROUND, j[is_far] + AROUND), 1.0)
     size, half = 2 * AROUND + 1, 0.5 * WINDOW_M
-    while True:
+    for _ in range(MOST_PLACES):
         sums = np.lib.stride_tricks.sliding_window_view(counts, (size, size)).sum(axis=(2, 3))
         a, b = np.unravel_index(int(sums.argmax()), sums.shape)
         if sums[a, b] < PLACE_UNITS * site.unit:
