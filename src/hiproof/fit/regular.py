@@ -7,8 +7,6 @@ else the points determine are fitted at once, by distances at right angles.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from ..primitives.contract import CX, CY, HALF_LENGTH, HALF_WIDTH, KAPPA, Q0, Q1, Q2, Primitive
@@ -123,11 +121,6 @@ def measure_misfit(points: np.ndarray, shape: Primitive, theta: np.ndarray) -> f
 def average_distances(distances: np.ndarray) -> float:
     """Return the mean of distances (n,), each at most twice LEAST_REACH_M."""
     return float(np.minimum(distances, 2.0 * LEAST_REACH_M).mean()) if len(distances) else 0.0
-
-
-def is_regular(parameters: Mapping[str, float]) -> bool:
-    """Return whether a plan is as long as wide."""
-    return parameters["width"] == parameters["length"]
 
 
 def measure_leans(points: np.ndarray, shape: Primitive, theta: np.ndarray) -> np.ndarray:

@@ -121,18 +121,20 @@ def name_volumes(
     keeps_shapes = bool(types) and not {*CATALOGUE} <= {*types, *CURVED}
     site = make_site(scene, plan_outline, unit, plan.border, keeps_shapes)
     roof = start_roof(volumes, outline, plan, scene)
-    roof, site = improve_beside(roof, site, Whole(scene, plan, outline))
+    whole = Whole(scene, plan, outline) if outline.area > LARGE_ROOF_M2 else None
+    roof, site = improve_beside(roof, site, whole)
     return read_parts(roof, site, plan_outline, plan, types)
 
 
-def improve_beside(roof: Tables, site: Site, whole: Whole) -> tuple[Tables, Site]:
+def improve_beside(roof: Tables, site: Site, whole: Whole | None) -> tuple[Tables, Site]:
     """Improve a roof, also with its points moved to where its eaves are level, if that is cheaper.
 
-    Volumes are added to large roofs. Returns the roof and the site that it explains.
+    Volumes are added to a large roof, of which `whole` has the points. Returns the roof and the
+    site that it explains.
     """
     trial, drawing = make_tables_like(roof), make_drawing(len(roof.sides))
     cost = improve_all(roof, trial, site, drawing)
-    if whole.area > LARGE_ROOF_M2 and add_volumes(roof, trial, site, drawing, whole):
+    if whole is not None and add_volumes(roof, trial, site, drawing, whole):
         cost = improve_all(roof, trial, site, drawing)
     shift = estimate_shift(roof, site)
     if not shift.any():

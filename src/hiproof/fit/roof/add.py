@@ -17,10 +17,9 @@ from ..union.candidates import (
     Effort,
     find_best_rectangles,
     list_candidates,
-    make_grids,
 )
+from ..union.grow import prepare_growth
 from ..union.objective import compute_costs
-from ..union.plan import find_cells
 from ..union.scene import Scene
 from ..union.sides import Side
 from ..union.volumes import DIRECTION, REPLACES
@@ -101,14 +100,11 @@ def list_additions(roof: Tables, scene: Scene) -> Iterator[tuple[np.ndarray, lis
     if len(unexplained) < FEWEST_UNEXPLAINED:
         return
     candidates = list_candidates(scene, unexplained, MOST_NEW_PLANES, EFFORT)
-    cells = [
-        np.array(
-            [find_cells(grid[axis], x) for grid, x in zip(make_grids(scene), places, strict=True)]
-        )
-        for axis, places in enumerate((scene.U, scene.V))
-    ]
+    ground = prepare_growth(scene, candidates)
     for replaces in (False, True):
-        gains, rectangles = find_best_rectangles(scene, candidates, *cells, costs, z, replaces)
+        gains, rectangles = find_best_rectangles(
+            scene, candidates, ground.cell_u, ground.cell_v, costs, z, replaces
+        )
         candidates[:, REPLACES] = replaces
         for m in np.argsort(-gains, kind="stable")[:TRIED].tolist():
             if gains[m] > 0.0:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -15,7 +15,7 @@ import shapely
 
 from ...geometry.rings import OVERLAY_GRID_M
 from ...model import Part, Piece
-from ...model.heights import find_highest
+from ...model.heights import find_highest, join_highest, measure_part
 from ...primitives.catalogue import ROUND
 from ...settings import Settings
 from ..direction import outline_rectangle
@@ -41,7 +41,8 @@ NO_HEIGHTS = np.zeros(0)  # What is not seen has no heights.
 class PartsRoof:
     """A roof of `parts`, the points (n, 3) inside its `outline`, and what they cost.
 
-    A point further than `tolerance_m` from the roof costs 1.
+    A point further than `tolerance_m` from the roof costs 1. What a part covers is measured once
+    for all roofs that have it: `covered` holds each part by its identity.
     """
 
     parts: list[Part]
@@ -49,11 +50,16 @@ class PartsRoof:
     outline: shapely.Polygon
     unit: float
     tolerance_m: float
+    covered: dict[int, tuple[Part, list]] = field(default_factory=dict)
 
     @cached_property
     def highest(self) -> tuple[np.ndarray, np.ndarray]:
         """The roof's height (n,) at each point, and the number of the part that has it."""
-        return find_highest(self.parts, self.points[:, :2])
+        x, y = np.ascontiguousarray(self.points[:, :2].T)
+        for part in self.parts:
+            if id(part) not in self.covered:
+                self.covered[id(part)] = part, measure_part(part, x, y)
+        return join_highest([self.covered[id(part)][1] for part in self.parts], len(x))
 
     @cached_property
     def misfits(self) -> np.ndarray:
@@ -168,6 +174,8 @@ def list_roofs(roof: PartsRoof, shape: Part) -> Iterator[list[Part]]:
 
 def trim_part(part: Part, plan: shapely.Geometry) -> list[Part]:
     """Return a part without what lies in a plan, if most of it lies outside."""
+    if not any(shapely.intersects(piece.outline, plan) for piece in part.pieces):
+        return [part]
     pieces = tuple(
         Piece(polygon, piece.planes)
         for piece in part.pieces
@@ -187,7 +195,8 @@ def cover_bare_places(
     The shape has the bare places itself, or a neighbour has them, or a level part under the shape.
     """
     under, parts = unite_outlines(replaced), [*others, shape]
-    bare = shapely.difference(under, unite_outlines(parts), grid_size=OVERLAY_GRID_M)
+    roofed = unite_outlines(select_touching(parts, under))
+    bare = shapely.difference(under, roofed, grid_size=OVERLAY_GRID_M)
     places = make_flat(list_polygons(bare), shape)
     if not places.pieces:
         yield parts

@@ -117,13 +117,19 @@ def find_centre(
 
     It begins with the disc around a `centre`.
     """
+    # A round moves the middle by a radius at most, so no other points matter.
+    reach, (x, y) = CENTRE_ROUNDS * radius, points[:, :2].T
+    around = np.flatnonzero((np.abs(x - centre[0]) <= reach) & (np.abs(y - centre[1]) <= reach))
+    some = points[around]
     for _ in range(CENTRE_ROUNDS):
-        near = np.hypot(*(points[:, :2] - centre).T) <= radius
+        near = np.hypot(*(some[:, :2] - centre).T) <= radius
         if not near.any():
             break
-        above = np.maximum(points[near, 2] - points[near, 2].mean(), 0.01)
-        centre = above @ points[near, :2] / above.sum()
-    return centre, near
+        above = np.maximum(some[near, 2] - some[near, 2].mean(), 0.01)
+        centre = above @ some[near, :2] / above.sum()
+    disc = np.zeros(len(points), bool)
+    disc[around[near]] = True
+    return centre, disc
 
 
 def measure_round_gaps(points: np.ndarray, centre: np.ndarray) -> np.ndarray:
