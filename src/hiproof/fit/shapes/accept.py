@@ -41,8 +41,8 @@ NO_HEIGHTS = np.zeros(0)  # What is not seen has no heights.
 class PartsRoof:
     """A roof of `parts`, the points (n, 3) inside its `outline`, and what they cost.
 
-    A point further than `tolerance_m` from the roof costs 1. What a part covers is measured once
-    for all roofs that have it: `covered` holds each part by its identity.
+    A point further than `tolerance_m` from the roof costs 1. `known` is what another roof knows of
+    the parts that both have.
     """
 
     parts: list[Part]
@@ -50,16 +50,22 @@ class PartsRoof:
     outline: shapely.Polygon
     unit: float
     tolerance_m: float
-    covered: dict[int, tuple[Part, list]] = field(default_factory=dict)
+    known: dict[int, tuple[Part, list]] = field(default_factory=dict)
+
+    @cached_property
+    def covered(self) -> dict[int, tuple[Part, list]]:
+        """Each part, by its identity, and which points it covers at which heights."""
+        x, y = np.ascontiguousarray(self.points[:, :2].T)
+        return {
+            id(part): self.known.get(id(part)) or (part, measure_part(part, x, y))
+            for part in self.parts
+        }
 
     @cached_property
     def highest(self) -> tuple[np.ndarray, np.ndarray]:
         """The roof's height (n,) at each point, and the number of the part that has it."""
-        x, y = np.ascontiguousarray(self.points[:, :2].T)
-        for part in self.parts:
-            if id(part) not in self.covered:
-                self.covered[id(part)] = part, measure_part(part, x, y)
-        return join_highest([self.covered[id(part)][1] for part in self.parts], len(x))
+        pieces = [self.covered[id(part)][1] for part in self.parts]
+        return join_highest(pieces, len(self.points))
 
     @cached_property
     def misfits(self) -> np.ndarray:
@@ -136,7 +142,7 @@ def accept(roof: PartsRoof, shapes: Iterable[tuple[Part, int]]) -> PartsRoof:
     best, least = roof, roof.price
     for shape, count in shapes:
         for parts in list_roofs(roof, shape):
-            new = replace(roof, parts=parts)
+            new = replace(roof, parts=parts, known=roof.covered)
             price = new.price + UNKNOWN_UNITS * roof.unit * count
             if price < least:
                 best, least = new, price
