@@ -5,6 +5,7 @@ import pytest
 
 from hiproof.fit import kernel
 from hiproof.fit.kernel import Noise, Problem
+from hiproof.fit.likelihood import fit_heights
 from hiproof.fit.tables import tables, variants
 from hiproof.primitives import CATALOGUE
 
@@ -111,6 +112,23 @@ def test_fixed_parameters_do_not_move():
     kernel.minimise(problem, tables(), kind, moved, lower, upper, NOISE, 20, 1e-6)
     np.testing.assert_array_equal(moved[fixed], theta[fixed])
     assert abs(moved[5] - theta[5]) < 0.1
+
+
+@pytest.mark.parametrize("name", ["broach", "dome", "onion"])
+def test_a_round_shape_is_fitted_at_right_angles_and_keeps_its_ratio(name):
+    """Noise of points at right angles is that of their heights where the roof is steep."""
+    shape = CATALOGUE[name]
+    truth = shape.to_theta(shape.typical(8.0, 8.0, 8.0), 0.3, np.zeros(3))
+    rng = np.random.default_rng(3)
+    xy = rng.uniform(-3.9, 3.9, (900, 2))
+    z = shape.height_at(truth, xy + rng.normal(0.0, 0.05, xy.shape))
+    points = np.column_stack([xy, z + rng.normal(0.0, 0.05, len(xy)), np.ones(len(xy))])
+    start = truth + np.array([0.1, -0.1, 0.0, 0.3, 0.3, 0.2, 0.05, 0.0, 0.0])
+    free = (0, 1) if name == "broach" else (0, 1, 3)
+    theta, noise = fit_heights(points, shape, start, free)
+    assert theta[4] == pytest.approx(theta[3] * start[4] / start[3], abs=1e-9)
+    assert theta[:2] == pytest.approx(truth[:2], abs=0.05)
+    assert noise.sigma == pytest.approx(0.05, abs=0.015)
 
 
 def test_a_point_of_no_roof_probability_does_not_matter():

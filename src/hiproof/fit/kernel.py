@@ -65,6 +65,8 @@ class Problem(NamedTuple):
     # log density of an outlier, per m3 (per m of height where the plan is given)
     log_background: float
     plan_is_free: bool  # whether the sides are fitted; a given outline has no plan likelihood
+    # whether noise is at right angles to the roof, and its plan keeps its ratio of sides
+    is_round: bool = False
 
 
 class Noise(NamedTuple):
@@ -79,6 +81,7 @@ class Space(NamedTuple):
     """Working arrays of one evaluation."""
 
     planes: np.ndarray  # (MAX_PLANES, 3)
+    leans: np.ndarray  # (MAX_PLANES,) distances at right angles to them of points 1 m above
     jacobian: np.ndarray  # (MAX_PLANES, 3, SIZE) of the planes by theta
     moments: np.ndarray  # (MAX_PLANES, 9) six of the Hessian, three of the gradient
     sides: np.ndarray  # (4, 5) at +u, -u, +v, -v: two of the gradient, three of the Hessian
@@ -88,6 +91,7 @@ class Space(NamedTuple):
 def new_space():
     return Space(
         np.zeros((MAX_PLANES, 3)),
+        np.ones(MAX_PLANES),
         np.zeros((MAX_PLANES, 3, SIZE)),
         np.zeros((MAX_PLANES, 9)),
         np.zeros((4, 5)),
@@ -175,6 +179,14 @@ def active_plane(planes, ends, strips, half_width, u, v):
 
 
 @compiled
+def measure_leans(tables, kind, theta, space):
+    """Fill the leans of `space`, which stay while theta is fitted."""
+    planes_from_terms(tables, kind, theta, space.planes)
+    for j in range(tables.planes[kind]):
+        space.leans[j] = 1.0 / math.hypot(1.0, math.hypot(space.planes[j, 0], space.planes[j, 1]))
+
+
+@compiled
 def sum_moments(problem, tables, kind, theta, noise, space):
     """Return minus the log likelihood at `theta`, and fill `space`.
 
@@ -189,7 +201,7 @@ def sum_moments(problem, tables, kind, theta, noise, space):
     half_width, half_length = theta[HALF_WIDTH], theta[HALF_LENGTH]
     per_sigma, per_tau = 1.0 / noise.sigma, 1.0 / noise.tau
     background = math.exp(problem.log_background)
-    scale = (1.0 - noise.eps) * per_sigma / SQRT_2PI
+    scale = (1.0 - noise.eps) / SQRT_2PI
     if problem.plan_is_free:
         scale /= 4.0 * half_width * half_length
     moments[:] = 0.0
@@ -200,7 +212,8 @@ def sum_moments(problem, tables, kind, theta, noise, space):
         dx, dy = points[i, 0] - theta[CENTRE_X], points[i, 1] - theta[CENTRE_Y]
         u, v = c * dx + s * dy, c * dy - s * dx
         j, roof = active_plane(planes, ends, strips, half_width, u, v)
-        residual = (points[i, 2] - roof) * per_sigma
+        precision = space.leans[j] * per_sigma
+        residual = (points[i, 2] - roof) * precision
         prior = points[i, 3]
         outlier = (1.0 - prior * (1.0 - noise.eps)) * background
         margin_u, margin_v = SOFT, SOFT
@@ -213,7 +226,7 @@ def sum_moments(problem, tables, kind, theta, noise, space):
         inlier = (
             0.0
             if is_far
-            else prior * scale * inside_u * inside_v * math.exp(-0.5 * residual * residual)
+            else prior * scale * precision * inside_u * inside_v * math.exp(-0.5 * residual**2)
         )
         product *= inlier + outlier
         if product < 1e-250 or product > 1e250:
@@ -224,7 +237,7 @@ def sum_moments(problem, tables, kind, theta, noise, space):
         w = inlier / (inlier + outlier)
         inliers += w
         squares += w * residual * residual
-        add_moments(moments[j], w * per_sigma * per_sigma, w * residual * per_sigma, u, v)
+        add_moments(moments[j], w * precision * precision, w * residual * precision, u, v)
         if margin_u < SOFT:
             add_side(
                 sides[0 if u > 0 else 1], w * (1.0 - inside_u) * per_tau, inside_u * per_tau, v
@@ -380,17 +393,31 @@ def freeze_at_bounds(theta, lower, upper, size, gradient, hessian):
         if (theta[k] <= lower[k] and gradient[k] >= 0.0) or (
             theta[k] >= upper[k] and gradient[k] <= 0.0
         ):
-            gradient[k] = 0.0
-            hessian[k, :] = 0.0
-            hessian[:, k] = 0.0
-            hessian[k, k] = 1.0
+            fix(k, gradient, hessian)
 
 
 @compiled
-def take_step(theta, step, lower, upper, size, moved):
-    """Set `moved` to theta + step, shortened and within the bounds.
+def tie_sides(ratio, gradient, hessian):
+    """Take the half length, which is `ratio` half widths, out of the step."""
+    gradient[HALF_WIDTH] += ratio * gradient[HALF_LENGTH]
+    hessian[HALF_WIDTH, :] += ratio * hessian[HALF_LENGTH, :]
+    hessian[:, HALF_WIDTH] += ratio * hessian[:, HALF_LENGTH]
+    fix(HALF_LENGTH, gradient, hessian)
 
-    Steps are shortened to the step caps.
+
+@compiled
+def fix(k, gradient, hessian):
+    gradient[k] = 0.0
+    hessian[k, :] = 0.0
+    hessian[:, k] = 0.0
+    hessian[k, k] = 1.0
+
+
+@compiled
+def take_step(theta, step, lower, upper, size, ratio, moved):
+    """Set `moved` to theta + step, shortened to the step caps and within the bounds.
+
+    Its half length is `ratio` half widths, where that is positive.
     """
     share = 1.0
     for k in range(size):
@@ -400,6 +427,8 @@ def take_step(theta, step, lower, upper, size, moved):
     for k in range(SIZE):
         move = share * step[k] if k < size else 0.0
         moved[k] = min(max(theta[k] + move, lower[k]), upper[k])
+    if ratio > 0.0:
+        moved[HALF_LENGTH] = ratio * moved[HALF_WIDTH]
 
 
 @compiled
@@ -417,19 +446,24 @@ def minimise(problem, tables, kind, theta, lower, upper, noise, iterations, tole
     gradient, hessian = np.zeros(SIZE), np.zeros((SIZE, SIZE))
     gradient_new, hessian_new = np.zeros(SIZE), np.zeros((SIZE, SIZE))
     step, factor, moved = np.zeros(SIZE), np.zeros((SIZE, SIZE)), theta.copy()
-    take_step(theta, step, lower, upper, size, theta)
+    ratio = theta[HALF_LENGTH] / theta[HALF_WIDTH] if problem.is_round else 0.0
+    take_step(theta, step, lower, upper, size, ratio, theta)
+    if problem.is_round:
+        measure_leans(tables, kind, theta, space)
     value, inliers, squares = evaluate(
         problem, tables, kind, theta, noise, space, gradient, hessian
     )
     evaluations, damping = 1, 1e-3
     for _ in range(iterations):
+        if problem.is_round:
+            tie_sides(ratio, gradient, hessian)
         freeze_at_bounds(theta, lower, upper, size, gradient, hessian)
         gain = -1.0
         for _ in range(6):
             if not solve_damped(hessian, gradient, damping, size, step, factor):
                 damping = max(10 * damping, 1e-3)
                 continue
-            take_step(theta, step, lower, upper, size, moved)
+            take_step(theta, step, lower, upper, size, ratio, moved)
             value_new, inliers_new, squares_new = evaluate(
                 problem, tables, kind, moved, noise, space, gradient_new, hessian_new
             )
@@ -617,6 +651,8 @@ def height_hessian(problem, tables, kind, theta, noise):
     """
     space = new_space()
     gradient, hessian = np.zeros(SIZE), np.zeros((SIZE, SIZE))
+    if problem.is_round:
+        measure_leans(tables, kind, theta, space)
     _, inliers, _ = sum_moments(problem, tables, kind, theta, noise, space)
     add_height_terms(tables, kind, theta, space, gradient, hessian)
     for a in range(SIZE):

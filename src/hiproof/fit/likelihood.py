@@ -235,12 +235,12 @@ def fit_likelihood(
 def fit_heights(
     points: np.ndarray, primitive: Primitive, theta: np.ndarray, free: tuple[int, ...] = ()
 ) -> tuple[np.ndarray, Noise]:
-    """Fit heights and slopes of one shape to `points` (n, 4) over the plan of `theta`.
+    """Fit heights and slopes of one round shape to `points` (n, 4) over the plan of `theta`.
 
-    The numbers `free` of the plan are fitted, too. Returns theta (9,) and the noise learnt.
+    The numbers `free` of the plan are fitted, too, and its half length with its half width.
+    Distances are at right angles. Returns theta (9,) and the noise learnt.
     """
-    search = replace(new_search(points, (primitive.name,), False, COARSE_POINTS), free=free)
-    kind = search.shapes.index(primitive)
+    search, kind = new_round_search(points, primitive, free)
     thetas = theta[None]
     if primitive.minima:
         # The pointed top has few points, which are outliers for a start that is not near.
@@ -254,6 +254,36 @@ def fit_heights(
     candidates, noises = learn(search, starts)
     best = int(np.argmin(candidates.values))
     return candidates.thetas[best], Noise(*noises[best])
+
+
+def new_round_search(
+    points: np.ndarray, primitive: Primitive, free: tuple[int, ...]
+) -> tuple[Search, int]:
+    """Set up the search for one round shape, and return its row of the tables, too."""
+    search = new_search(points, (primitive.name,), False, COARSE_POINTS)
+    search.low[:, Q0] = -np.inf  # Points of a disc around its top do not reach down to the eave.
+    whole = search.whole._replace(is_round=True)
+    return replace(search, whole=whole, free=free), search.shapes.index(primitive)
+
+
+def find_covariance(
+    points: np.ndarray,
+    primitive: Primitive,
+    theta: np.ndarray,
+    free: tuple[int, ...],
+    width_variance: float = 0.0,
+) -> np.ndarray:
+    """Find the covariance (9, 9) of what `fit_heights` fits to `points` (n, 4).
+
+    All other numbers are taken as known, but for half a width with a variance (m2).
+    """
+    search, kind = new_round_search(points, primitive, free)
+    rows = np.tile(theta, (len(search.low), 1))
+    held = replace(search, low=rows, high=rows)
+    _, (noise,) = learn(held, Candidates(np.array([kind]), theta[None], np.zeros(1)))
+    covariance = estimate_covariance(search, kind, theta, Noise(*noise.tolist()), np.zeros(4))
+    sides = np.isin(np.arange(9), [HALF_WIDTH, HALF_LENGTH])
+    return covariance + width_variance * np.outer(sides, sides)
 
 
 def search_types(
@@ -522,13 +552,15 @@ def estimate_covariance(
     c, s = np.cos(theta[KAPPA]), np.sin(theta[KAPPA])
     turn = np.eye(4)
     turn[:2, :2] = [[c, -s], [s, c]]
-    first = KAPPA if search.whole.plan_is_free else Q0
-    heights = [k for k in range(first, search.tables.size[kind]) if k not in PLAN_INDICES]
-    by_heights = np.linalg.inv(hessian[np.ix_(heights, heights)] + 1e-6 * np.eye(len(heights)))
-    covariance = np.zeros((9, 9))
+    plan = (KAPPA,) if search.whole.plan_is_free else search.free
+    heights = [*plan, *range(Q0, search.tables.size[kind])]
+    tied = np.eye(9)[:, heights]
+    if search.whole.is_round:
+        tied[HALF_LENGTH] = theta[HALF_LENGTH] / theta[HALF_WIDTH] * tied[HALF_WIDTH]
+    by_heights = np.linalg.inv(tied.T @ hessian @ tied + 1e-6 * np.eye(len(heights)))
     if not search.whole.plan_is_free:
-        covariance[np.ix_(heights, heights)] = by_heights
-        return covariance
+        return tied @ by_heights @ tied.T
+    covariance = np.zeros((9, 9))
     response = -by_heights @ hessian[np.ix_(heights, PLAN_INDICES)]
     of_plan = turn @ np.diag(variances) @ turn.T
     covariance[np.ix_(PLAN_INDICES, PLAN_INDICES)] = of_plan

@@ -15,6 +15,8 @@ from ..log import count_things
 from ..model import Fit
 from ..primitives import CATALOGUE, get
 from ..primitives.contract import (
+    CX,
+    CY,
     HALF_LENGTH,
     HALF_WIDTH,
     KAPPA,
@@ -26,8 +28,7 @@ from ..primitives.contract import (
 from ..read.plausible import is_plausible
 from ..settings import Settings
 from .direction import outline_rectangle
-from .likelihood import Estimate, fit_heights, fit_likelihood, plan_extents
-from .regular import REGULAR, find_covariance, fit_regular, measure_misfit
+from .likelihood import Estimate, find_covariance, fit_heights, fit_likelihood, plan_extents
 
 FEWEST_POINTS = 4  # points; a plane and one to contradict it
 THINNEST = 1e-6  # smallest ratio of extents in plan that is not a line
@@ -37,7 +38,13 @@ HULL_REACH, HULL_SIGMAS = 1.3, 4.0
 HULL_ROUNDS = 2  # The first plan of a half disc is far too narrow.
 # A regular plan may lie so much further (m, in the mean) from the points than a free one.
 FARTHER_M = 0.01
-ROOF_WEIGHT = 0.5  # From this weight on, a point is of the roof.
+WIDTH_ROUNDS = 2  # Rounds in which points are taken from within a regular plan.
+# What points determine of regular plans. Of a spire, they show no width.
+REGULAR = {
+    "broach": (CX, CY, KAPPA),
+    "hexagonal_spire": (CX, CY, KAPPA),
+    "onion": (CX, CY, HALF_WIDTH),
+}
 HULL_SPACINGS = 0.3  # The hull of points lies so much inside of what they are drawn from.
 
 
@@ -121,17 +128,19 @@ def make_regular(cloud: np.ndarray, estimate: Estimate) -> Estimate:
 
     A width that these do not show keeps the variance of the free plan.
     """
-    points, shape = cloud[cloud[:, 3] >= ROOF_WEIGHT, :3], estimate.primitive
-    theta = estimate.theta.copy()
+    shape, theta = estimate.primitive, estimate.theta.copy()
     theta[[HALF_WIDTH, HALF_LENGTH]] = theta[[HALF_WIDTH, HALF_LENGTH]].min()
-    theta = fit_regular(points, shape, theta)
-    inside = points[np.hypot(*(points[:, :2] - theta[:2]).T) <= theta[HALF_WIDTH]]
-    before, after = (measure_misfit(inside, shape, one) for one in (estimate.theta, theta))
-    if after > before + FARTHER_M:
+    free = REGULAR[shape.name]
+    for _ in range(WIDTH_ROUNDS):
+        inside = cloud[np.hypot(*(cloud[:, :2] - theta[:2]).T) <= theta[HALF_WIDTH]]
+        theta, noise = fit_heights(inside, shape, theta, free)
+    _, before = fit_heights(inside, shape, estimate.theta)
+    if noise.sigma > before.sigma + FARTHER_M:
         return estimate
     width_variance = max(estimate.covariance[k, k] for k in (HALF_WIDTH, HALF_LENGTH))
-    covariance = find_covariance(points, shape, theta, width_variance=width_variance)
-    return replace(estimate, theta=theta, covariance=covariance)
+    width_variance *= HALF_WIDTH not in free
+    covariance = find_covariance(inside, shape, theta, free, width_variance)
+    return replace(estimate, theta=theta, covariance=covariance, noise=noise)
 
 
 def checked_types(types: tuple[str, ...]) -> tuple[str, ...]:

@@ -20,9 +20,8 @@ import shapely
 
 from ..compose.settle import make_pieces
 from ..errors import FitError, InputError
-from ..fit.regular import measure_leans
 from ..model import Building, Part, Roof, as_xyz
-from ..primitives.catalogue import CATALOGUE, CURVED
+from ..primitives.catalogue import CURVED
 from ..primitives.parameters import SIDED, refuse_no_shape
 from ..write.parameters import building_record
 from .change import from_lowest_eave
@@ -253,21 +252,19 @@ class Heights:
                 first += len(own_planes)
             result.append(np.concatenate(planes))
         gaps = np.clip(self.z - top, -UNBOUNDED_M, UNBOUNDED_M)
-        leans = self.leans(x, np.where(np.isfinite(top), part, NO_PART))
+        leans = self.leans(np.where(np.isfinite(top), part, NO_PART), row, result)
         return RefitSurface(gaps * leans, leans, part, row, result)
 
-    def leans(self, x: np.ndarray, part: np.ndarray) -> np.ndarray:
+    def leans(self, part: np.ndarray, row: np.ndarray, planes: list[np.ndarray]) -> np.ndarray:
         """Return the share (n,) of heights over curved parts that is at right angles.
 
         It is 1 over others: points lie as far off in plan as in height, which steep slopes show.
         """
         result = np.ones(len(part))
         for index in (k for k, one in enumerate(self.parts) if one.type in CURVED):
-            parameters, translation = self.place(index, x)
-            shape = CATALOGUE[self.parts[index].type].variant(parameters)
-            theta = shape.to_theta(parameters, self.parts[index].kappa, translation)
             over = part == index
-            result[over] = measure_leans(self.terms[over], shape, theta)
+            slopes = planes[index][row[over], :2]
+            result[over] = 1.0 / np.hypot(1.0, np.hypot(*slopes.T))
         return result
 
     def jacobian(self, x: np.ndarray, surface: RefitSurface) -> np.ndarray:
