@@ -1,6 +1,7 @@
 """Two surveys registered to each other: by the ground first, and by roofs that agree with it."""
 
 import dataclasses
+import warnings
 
 import numpy as np
 import pytest
@@ -85,6 +86,25 @@ def test_without_ground_most_of_many_roofs_have_to_carry_a_shift(rises, is_appli
     found = register_surveys(draw_samples(3, rises, has_ground=False), READ)
     assert bool(found.clear_xyz.any()) is is_applied
     assert bool(found.doubt) is not is_applied
+
+
+@pytest.mark.parametrize("given", ["auto", "off", "0,0,0.6"])
+@pytest.mark.parametrize("has_ground", [True, False])
+@pytest.mark.parametrize("rise", [-0.6, 0.0, 0.2, 0.6])
+def test_a_height_taken_off_warns_where_roofs_alone_show_it(rise, has_ground, given):
+    samples = draw_samples(7, [0.0] * 12, (0.3, 0.0, rise), has_ground)
+    found = register_surveys(samples, dataclasses.replace(READ, shift=given))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        found.warn("survey of 2024-05-01")
+    texts = [text for text in map(str, (w.message for w in caught)) if "roofs alone" in text]
+    if rise and given == "auto" and not has_ground:
+        assert len(texts) == 1
+        assert f"{found.xyz[2]:+.2f} m in height rests on roofs alone (12 of 12" in texts[0]
+        assert "--shift off" in texts[0]
+        assert "--shift EAST,NORTH,UP" in texts[0]
+    else:
+        assert not texts
 
 
 def test_a_shift_beyond_the_bound_is_not_taken_off():

@@ -314,6 +314,26 @@ def test_the_shift_of_a_survey_is_taken_off_wherever_its_points_are_used(run, tm
     assert second.surveys.shift.clear_xyz[2] == pytest.approx(-0.2, abs=0.03)
 
 
+def test_a_town_that_rose_and_a_survey_without_ground_are_not_taken_for_a_shift_in_silence(
+    tmp_path,
+):
+    first, second = make_town(houses=8), make_town(houses=8, seed=7)
+    cloud = write_cloud(tmp_path / "first.laz", first.xyz, first.classification)
+    outlines = write_footprints(tmp_path / "outlines.geojson", first.footprints)
+    reconstruct_area(Request((str(cloud),), tmp_path / "run", str(outlines)))
+    roofs = second.classification == 6
+    raised = second.xyz[roofs] + [0.0, 0.0, 0.6]
+    later = str(write_cloud(tmp_path / "later.laz", raised, second.classification[roofs]))
+    request = make_request(tmp_path / "run", later, tmp_path / "auto")
+    with pytest.warns(
+        UserWarning, match=r"shift of \+0\.60 m in height rests on roofs alone \(8 of"
+    ):
+        update_area(request)
+    request = dataclasses.replace(request, out=tmp_path / "off")
+    by_change = update_area(request, changes={"read": {"shift": "off"}}).by_change
+    assert by_change == {"changed": 8}
+
+
 def test_without_its_clouds_a_run_is_compared_by_its_models(run, cloud, tmp_path):
     run = shutil.copytree(run, tmp_path / "run")
     record = json.loads((run / "run.json").read_text())

@@ -155,6 +155,14 @@ class SurveyShift:
                 "wrong, pass the shift of the survey with --shift EAST,NORTH,UP",
                 InputWarning,
             )
+        elif not self.places and self.clear_xyz[2] and self.sigma[2]:  # estimated, not given
+            warnings.warn(
+                f"{name}: the shift of {self.xyz[2]:+.2f} m in height rests on roofs alone "
+                f"({self.rests_on}), because no ground around them lies in both surveys. It would "
+                "hide that all roofs were raised or lowered alike. If they were, pass --shift off, "
+                "and if the shift is known, --shift EAST,NORTH,UP",
+                InputWarning,
+            )
         if self.tilt:
             warnings.warn(
                 f"{name}: the surveys are tilted to each other, by {self.tilt:.2f} m from one end "
