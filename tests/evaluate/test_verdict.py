@@ -151,6 +151,37 @@ def test_a_place_of_several_square_metres_off_the_roof_is_never_good(side_m, off
     assert not any(good)
 
 
+def stepped(step_x, high, size):
+    """A tower and, from `step_x` on, a low roof beside it."""
+    ring = shapely.get_coordinates(shapely.box(0, 0, *size).exterior)[:-1].tolist()
+    parts = [
+        {
+            "type": "flat",
+            "parameters": {"width": size[1], "length": east - west},
+            "position": [(west + east) / 2, size[1] / 2, height],
+        }
+        for west, east, height in [(0.0, step_x, high), (step_x, size[0], 6.0)]
+    ]
+    record = {"id": "a", "origin": [0, 0, 0], "z_ground": 0, "outline": [ring], "parts": parts}
+    return hiproof.build(record).model
+
+
+@pytest.mark.parametrize("high", [9.0, 98.0])
+@pytest.mark.parametrize("too_wide_m", [0.0, 4.0, 8.0])
+@pytest.mark.parametrize("width_m", [12.0, 80.0])
+def test_a_tower_that_reaches_over_a_place_without_points_is_not_good(width_m, too_wide_m, high):
+    """The place beside the tower holds no points, and the model goes on there at its height."""
+    good, size = [], (width_m + 30.0, 30.0)
+    model = stepped(width_m + too_wide_m, high, size)
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        xy = rng.uniform((0, 0), size, (int(4 * size[0] * size[1]), 2))
+        xy = xy[(xy[:, 0] < width_m) | (xy[:, 0] > width_m + too_wide_m)]
+        z = np.where(xy[:, 0] < width_m, high, 6.0) + rng.normal(0, 0.05, len(xy))
+        good.append(judge_model(model, np.column_stack([xy, z])).grade is Grade.GOOD)
+    assert sum(good) >= 18 if too_wide_m == 0 else not any(good)
+
+
 def test_points_off_along_the_outline_alone_do_not_count():
     """Gutters and what stands beside the walls give a few there, on old houses many."""
     rng = np.random.default_rng(6)

@@ -35,7 +35,7 @@ LEAST_NEAR, POOR_NEAR = 0.75, 0.6
 """Share of the roof points within NEAR_M of the roof, below which a model is fair, and poor. Roofs
 of old towns that look right have 0.75 to 0.9: gutters, parapets, chimneys."""
 
-MOST_UNSEEN, MOST_UNSEEN_M2, POOR_UNSEEN = 0.1, 30.0, 0.4
+MOST_UNSEEN, MOST_UNSEEN_M2, POOR_UNSEEN = 0.1, 15.0, 0.4
 """Share and area of the outline without roof points, above either of which a model is fair, and the
 share above which it is poor."""
 
