@@ -341,44 +341,28 @@ def trace_faces(xy, edges, follow):
 
 
 @compiled
-def chord(xy, edges, h, buckets, items):
-    """Return the length and direction of the chord left of half-edge `h`.
+def measure_chord(xy, edges, h, last, earlier):
+    """Return the length of the chord left of half-edge `h`, and the middle (2,) of it.
 
-    It is the ray from the half-edge's middle to the first edge; the direction is a unit vector.
-    Also returns `items`, as `list_near` does.
+    The chord is a ray from the half-edge's middle to the first edge of the same face. Its
+    half-edges are `last` and those that are `earlier` (2e,).
     """
-    layout = buckets[0]
     a, b = edges[h >> 1, h & 1], edges[h >> 1, 1 - (h & 1)]
     ax, ay = 0.5 * (xy[a, 0] + xy[b, 0]), 0.5 * (xy[a, 1] + xy[b, 1])
     dx, dy = float(xy[b, 0] - xy[a, 0]), float(xy[b, 1] - xy[a, 1])
     length = np.hypot(dx, dy)
-    nx, ny = -dy / length, dx / length
-    nearest, looked, farthest = np.inf, float(layout[2]), layout[2] * float(layout[3] + layout[4])
-    while True:
-        x, y = np.int64(ax + looked * nx), np.int64(ay + looked * ny)
-        items, n_items = list_near(
-            min(np.int64(ax), x) - 1,
-            min(np.int64(ay), y) - 1,
-            max(np.int64(ax), x) + 1,
-            max(np.int64(ay), y) + 1,
-            buckets,
-            items,
-        )
-        for e in items[:n_items]:
-            if e == h >> 1:
-                continue
-            c, d = edges[e, 0], edges[e, 1]
-            cx, cy, ex, ey = xy[c, 0] - ax, xy[c, 1] - ay, xy[d, 0] - ax, xy[d, 1] - ay
-            side_c, side_d = nx * cy - ny * cx, nx * ey - ny * ex
-            if side_c * side_d > 0 or side_c == side_d:
-                continue
+    nx, ny, nearest, g = -dy / length, dx / length, np.inf, last
+    while g >= 0:
+        c, d = edges[g >> 1, 0], edges[g >> 1, 1]
+        cx, cy, ex, ey = xy[c, 0] - ax, xy[c, 1] - ay, xy[d, 0] - ax, xy[d, 1] - ay
+        side_c, side_d = nx * cy - ny * cx, nx * ey - ny * ex
+        if g >> 1 != h >> 1 and side_c * side_d <= 0 and side_c != side_d:
             s = side_c / (side_c - side_d)
             along = nx * (cx + s * (ex - cx)) + ny * (cy + s * (ey - cy))
             if 0 < along < nearest:
                 nearest = along
-        if nearest <= looked or looked > farthest:
-            return nearest, nx, ny, items
-        looked *= 2.0
+        g = earlier[g]
+    return nearest, ax + 0.5 * nearest * nx, ay + 0.5 * nearest * ny
 
 
 @compiled
@@ -387,26 +371,18 @@ def face_points(xy, edges, face, faces):
 
     It is the middle of the face's longest chord at right angles to an edge's middle.
     """
-    longest, best = np.zeros(faces), np.zeros(faces)
-    points, items = np.zeros((faces, 2)), np.empty(0, np.int64)
-    if len(edges) == 0:
-        return points
-    buckets = lay_buckets(xy, len(edges))
-    for e in range(len(edges)):
-        buckets = enter_edge(e, xy, edges, buckets)
-    for h in range(2 * len(edges)):
-        d = xy[edges[h >> 1, 0]] - xy[edges[h >> 1, 1]]
-        longest[face[h]] = max(longest[face[h]], np.hypot(float(d[0]), float(d[1])))
-    for h in range(2 * len(edges)):
-        f, a, b = face[h], edges[h >> 1, h & 1], edges[h >> 1, 1 - (h & 1)]
-        length = np.hypot(float(xy[a, 0] - xy[b, 0]), float(xy[a, 1] - xy[b, 1]))
-        if f == 0 or length < 0.3 * longest[f]:
-            continue
-        reach, nx, ny, items = chord(xy, edges, h, buckets, items)
-        if np.isfinite(reach) and reach > best[f]:
-            best[f] = reach
-            points[f, 0] = 0.5 * (xy[a, 0] + xy[b, 0]) + 0.5 * reach * nx
-            points[f, 1] = 0.5 * (xy[a, 1] + xy[b, 1]) + 0.5 * reach * ny
+    longest, best, points = np.zeros(faces), np.zeros(faces), np.zeros((faces, 2))
+    last, earlier = np.full(faces, -1, np.int64), np.empty(len(face), np.int64)
+    length = edge_lengths(xy, edges)
+    for h in range(len(face)):
+        longest[face[h]] = max(longest[face[h]], length[h >> 1])
+        earlier[h], last[face[h]] = last[face[h]], h
+    for h in range(len(face)):
+        f = face[h]
+        if f > 0 and length[h >> 1] >= 0.3 * longest[f]:
+            reach, x, y = measure_chord(xy, edges, h, last[f], earlier)
+            if np.isfinite(reach) and reach > best[f]:
+                best[f], points[f, 0], points[f, 1] = reach, x, y
     return points
 
 
