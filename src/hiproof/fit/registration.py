@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy
 import shapely
 
 from ..geometry.grid import number_cells
@@ -57,16 +58,15 @@ EVERY = 4
 """One point in so many takes part in the first search."""
 
 BLUR_M, STRAY = 0.25, math.exp(-4.0)
-"""Width (m) of a soft edge; density far outside over that inside, as in fit/align.py."""
+"""Width (m) of a soft edge, as in fit/outline; density far outside over that inside: points of
+walls and neighbours.
+"""
 
 SQUARE_M = 50.0
 """Side (m) of the squares whose scatter is measured: a few houses each."""
 
 RASTER_MARGIN = round((FARTHEST_SHIFT_M + 1.2) / RASTER_PITCH_M)
 """Pitches of raster around the points, so that no shift leads out of it."""
-
-RASTER_ROWS_AT_ONCE = 100
-"""Rows of a raster that are smoothed at once: some megabytes."""
 
 MOST_SAMPLE_POINTS = 30_000
 """Points of a cell that are used, evenly thinned: more do not change a shift by a centimetre."""
@@ -266,7 +266,8 @@ def make_cell(xy: np.ndarray, polygons: list[shapely.Polygon]) -> Cell:
     xy = np.column_stack([places.real, places.imag])
     lower = np.floor(xy.min(axis=0) / RASTER_PITCH_M) - RASTER_MARGIN
     shape = (np.ceil(xy.max(axis=0) / RASTER_PITCH_M) + RASTER_MARGIN - lower).astype(int) + 1
-    inside = blur(rasterise(polygons, lower, shape), BLUR_M / RASTER_PITCH_M)
+    inside = rasterise(polygons, lower, shape)
+    inside = scipy.ndimage.gaussian_filter(inside, BLUR_M / RASTER_PITCH_M, truncate=3.0)
     i, j = (np.rint(xy / RASTER_PITCH_M) - lower).astype(int).T
     _, squares = number_cells(np.floor(xy / SQUARE_M))
     inside *= 1.0 - STRAY
@@ -279,38 +280,6 @@ def make_cell(xy: np.ndarray, polygons: list[shapely.Polygon]) -> Cell:
         costs.ravel(),
         int(shape[1]),
     )
-
-
-def blur(raster: np.ndarray, sigma: float) -> np.ndarray:
-    """Smooth a raster by a Gaussian of so many cells, cut off at three times that.
-
-    Beyond its border the raster goes on as its own mirror image.
-    """
-    reach = int(3.0 * sigma + 0.5)
-    weights = np.exp(-0.5 / sigma**2 * np.arange(-reach, reach + 1) ** 2)
-    weights /= weights.sum()
-    for _ in range(2):
-        raster = blur_columns(raster, weights).T
-    return raster
-
-
-def blur_columns(raster: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Smooth each column of a raster by symmetric `weights` (2 k + 1,).
-
-    It takes so many rows at once that its memory stays small.
-    """
-    reach, smooth = len(weights) // 2, np.empty_like(raster)
-    mirrored = np.pad(np.arange(len(raster)), reach, mode="symmetric")
-    for first in range(0, len(raster), RASTER_ROWS_AT_ONCE):
-        last = min(first + RASTER_ROWS_AT_ONCE, len(raster))
-        block = raster[mirrored[first : last + 2 * reach]].astype(float)
-        rows = [block[k : k + last - first] for k in range(2 * reach + 1)]
-        total, pair = weights[reach] * rows[reach], np.empty(rows[0].shape)
-        for k in range(reach):
-            np.add(rows[k], rows[2 * reach - k], out=pair)
-            total += np.multiply(pair, weights[k], out=pair)
-        smooth[first:last] = total
-    return smooth
 
 
 def rasterise(polygons: list[shapely.Polygon], lower: np.ndarray, shape: np.ndarray) -> np.ndarray:
