@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hiproof.compose import check_solid
-from hiproof.enrich.walls import OF_3DBAG, area_vectors
+from hiproof.enrich.walls import OF_3DBAG
 from streets import answer_street, list_party, lose_house, place_house
 
 GABLE = {"eave": 5.0, "rise": 3.0}
@@ -109,7 +109,7 @@ def test_party_walls_carry_their_neighbour(tmp_path):
     answers = answer_street(tmp_path, houses)
     areas = list_party(answers)
     for id, result in answers.items():
-        size = np.linalg.norm(area_vectors(result.building.solid), axis=1)
+        size = np.linalg.norm(result.building.solid.shell.face_areas, axis=1)
         carried = {}
         for face, values in result.surfaces.items():
             name = values["hiproof_party_with"]

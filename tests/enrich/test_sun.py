@@ -12,7 +12,7 @@ from hiproof.enrich.cadastre import Cadastre, locate, measure_panels
 from hiproof.enrich.far import SECTORS, find_horizon, measure_share
 from hiproof.enrich.run import enrich_run
 from hiproof.enrich.sun import irradiate, make_sky, measure_sky, sample_face
-from hiproof.enrich.walls import area_vectors, measure_faces
+from hiproof.enrich.walls import measure_faces
 from hiproof.errors import InputError
 from hiproof.model import ROOF, WALL
 from hiproof.settings import EnrichSettings
@@ -133,7 +133,7 @@ def test_shade_is_as_rays_have_it(tmp_path):
     differences = []
     for number in (0, 3, 4, 7):
         solid = buildings[number].solid
-        vectors = area_vectors(solid)
+        vectors = solid.shell.face_areas
         for face in (k for k, f in enumerate(solid.faces) if f.kind == ROOF):
             normal = vectors[face] / np.linalg.norm(vectors[face])
             places = sample_face(solid, face, normal)[::4] + (0, 0, 0.01)

@@ -11,14 +11,21 @@ import numpy as np
 import shapely
 
 from ..model import ROOF, Building, Solid
-from ..model.roof_figures import LEVEL_RIDGE_M, find_ground_height, make_triangles, roof_figures
+from ..model.roof_figures import (
+    LEVEL_RIDGE_M,
+    LEVEL_TRIANGLE_M,
+    cut_roof,
+    find_ground_height,
+    measure_area_below,
+    roof_figures,
+)
 from ..write.attribute_list import OWN
 from ..write.values import plain_text, round_value
 from .cadastre import Cadastre
 from .cut import Region, cut_walls
 from .house_type import is_residential, name_house_type, name_tabula_class
 from .party import Contact, Town
-from .walls import OF_3DBAG, area_vectors, measure_areas
+from .walls import OF_3DBAG, measure_areas
 
 RESIDENTIAL_STOREY_M, OTHER_STOREY_M = (2.5, 3.3), (3.0, 5.0)
 """Least and greatest height (m) of a storey, floor to floor: of dwellings from the least ceiling
@@ -83,21 +90,15 @@ class RoofLevels:
     """The plan areas of a roof above any height."""
 
     def __init__(self, solid: Solid) -> None:
-        triangles = make_triangles(solid, solid.vertices.mean(axis=0))
-        roof = np.array([face.kind == ROOF for face in solid.faces])[triangles.face_of]
-        self.plan = triangles.vectors[roof, 2]
-        self.z = np.sort(solid.vertices[triangles.fan[roof], 2], axis=1)
+        shell = solid.shell
+        corners, self.plan = cut_roof(solid, shell)
+        self.z = np.sort(solid.vertices[shell.index[corners], 2], axis=1)
         self.z_top = float(self.z.max())
 
     def measure_above(self, z: float) -> float:
         """Return the plan area (m2) where the roof is at least as high as `z`."""
-        low, middle, high = self.z.T
-        with np.errstate(divide="ignore", invalid="ignore"):
-            tip = (high - z) ** 2 / ((high - low) * (high - middle))
-            base = (z - low) ** 2 / ((high - low) * (middle - low))
-        share = np.where(z > middle, tip, 1.0 - base)
-        share = np.where(z <= low, 1.0, np.where(z > high, 0.0, share))
-        return float(self.plan @ share)
+        below = measure_area_below(z - LEVEL_TRIANGLE_M, self.z, self.plan)
+        return float(self.plan.sum()) - below
 
 
 def find_ridge_direction(solid: Solid) -> float | None:
@@ -105,7 +106,7 @@ def find_ridge_direction(solid: Solid) -> float | None:
 
     A ridge is an edge from which the roof faces on both sides fall away. None without one.
     """
-    vectors = area_vectors(solid)
+    vectors = solid.shell.face_areas
     sides: dict[tuple[int, int], int] = {}
     for number, face in enumerate(solid.faces):
         if face.kind == ROOF:

@@ -9,7 +9,7 @@ import shapely
 
 from ..geometry.rings import repair_polygons, ring_normals
 from ..model import CEILING, GROUND, ROOF, WALL, Solid
-from ..model.roof_figures import FLAT_SLOPE_DEG, make_triangles, sum_by_face
+from ..model.roof_figures import FLAT_SLOPE_DEG
 
 # Share of a wall's area that plan may show. Coordinates rounded to a tenth of a millimetre tilt a
 # wall of 1 m by 1e-4.
@@ -74,7 +74,7 @@ def measure_areas(solid: Solid, party_m2: float) -> dict[str, float]:
     A roof face is flat below FLAT_SLOPE_DEG, as its azimuth is null there. Ceilings over passages
     count as ground.
     """
-    vectors = area_vectors(solid)
+    vectors = solid.shell.face_areas
     size = np.linalg.norm(vectors, axis=1)
     kinds = np.array([face.kind for face in solid.faces])
     slope = np.degrees(np.arctan2(np.hypot(vectors[:, 0], vectors[:, 1]), vectors[:, 2]))
@@ -88,14 +88,8 @@ def measure_areas(solid: Solid, party_m2: float) -> dict[str, float]:
     }
 
 
-def area_vectors(solid: Solid) -> np.ndarray:
-    """Return the vector areas (faces, 3) of a solid's faces."""
-    triangles = make_triangles(solid, solid.vertices.mean(axis=0))
-    return sum_by_face(triangles.vectors, triangles.face_of, len(solid.faces))
-
-
 def measure_faces(solid: Solid) -> tuple[np.ndarray, np.ndarray]:
     """Return the areas (n,) and unit normals (n, 3) of a solid's faces."""
-    vectors = area_vectors(solid)
+    vectors = solid.shell.face_areas
     size = np.linalg.norm(vectors, axis=1)
     return size, vectors / np.maximum(size, 1e-12)[:, None]

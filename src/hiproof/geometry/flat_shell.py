@@ -99,6 +99,12 @@ class FlatShell:
         parts = np.cross(spokes, spokes[self.after]).T / 2
         return np.column_stack([np.bincount(self.ring_of, part, len(self.sizes)) for part in parts])
 
+    @cached_property
+    def face_areas(self) -> np.ndarray:
+        """The area vector (f, 3) of each face, of which its holes take away."""
+        parts = self.areas.T
+        return np.column_stack([np.bincount(self.face_of_ring, part, self.faces) for part in parts])
+
     @property
     def volume(self) -> float:
         """What the shell encloses, by the divergence theorem; positive if faces point outwards."""

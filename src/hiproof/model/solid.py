@@ -48,8 +48,12 @@ class Solid:
     @property
     def volume(self) -> float:
         """Volume [m3] by the divergence theorem; positive when the faces point outwards."""
-        local = self.vertices - self.vertices.mean(axis=0)
-        return round(FlatShell(local, *self.flatten()).volume, 9)
+        return round(self.shell.volume, 9)
+
+    @property
+    def shell(self) -> FlatShell:
+        """The shell as arrays, about the mean of its vertices."""
+        return FlatShell(self.vertices - self.vertices.mean(axis=0), *self.flatten())
 
     def flatten(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the shell as arrays; see `FlatShell`.
