@@ -21,12 +21,12 @@ from itertools import product
 
 import numpy as np
 import shapely
-from scipy.special import ndtr
 
 from ..compiled import compiled
 from ..geometry.grid import count_cells
 from ..geometry.point_in_polygon import find_inside
 from ..geometry.rings import counterclockwise, ring_edges
+from .outline.cost import cost_at_depth
 from .outline.lines import make_lines
 from .outline.settle import compute_span, side_offsets
 from .registration import BLUR_M, STRAY
@@ -205,7 +205,7 @@ def count_points_within(xy: np.ndarray, footprint: shapely.Polygon, overhang: fl
         measure_depth(np.repeat(x, count[1]), np.tile(y, count[0]), *ring_edges(footprint))
         + overhang
     )
-    costs = -np.log(STRAY + (1.0 - STRAY) * ndtr(depth / BLUR_M)).reshape(count)
+    costs = costs_at(depth / BLUR_M).reshape(count)
     few = np.ascontiguousarray(xy[:: max(1, len(xy) // SLID_POINTS)])
     best = np.zeros(2)
     for step, reach in ((COARSE_M, FARTHEST_M), (FINE_M, COARSE_M)):
@@ -223,6 +223,18 @@ def list_moves(step: float, reach: float) -> np.ndarray:
     """Return moves (m, 2), `step` apart, up to `reach` along either axis."""
     moves = np.arange(-reach, reach + 0.5 * step, step)
     return np.array(list(product(moves, moves)))
+
+
+@compiled
+def costs_at(depth):
+    """Return the cost of a roof point at each `depth` (n,), in blurs.
+
+    Depth is inside the footprint.
+    """
+    costs = np.empty(len(depth))
+    for k in range(len(depth)):
+        costs[k] = cost_at_depth(depth[k], False, STRAY)
+    return costs
 
 
 @compiled
