@@ -108,11 +108,12 @@ def fit_within_hull(cloud: np.ndarray, estimate: Estimate) -> Estimate:
     The covariance stays that of the free plan.
     """
     shape, theta, noise = estimate.primitive, estimate.theta.copy(), estimate.noise
+    reach_m = HULL_SIGMAS * noise.sigma
     for _ in range(HULL_ROUNDS):
         farthest = np.hypot(*(np.array(shape.rim) * theta[[HALF_LENGTH, HALF_WIDTH]]).T).max()
         reach = np.hypot(*(cloud[:, :2] - theta[:2]).T) <= HULL_REACH * farthest
         distance = np.abs(cloud[:, 2] - shape.height_at(theta, cloud[:, :2]))
-        on_roof = cloud[reach & (distance <= HULL_SIGMAS * noise.sigma)]
+        on_roof = cloud[reach & (distance <= reach_m)]
         hull = shapely.convex_hull(shapely.multipoints(on_roof[:, :2]))
         if not isinstance(hull, shapely.Polygon):
             break
@@ -120,6 +121,8 @@ def fit_within_hull(cloud: np.ndarray, estimate: Estimate) -> Estimate:
         inside = cloud[find_inside(hull, *cloud[:, :2].T)]
         theta[:Q0] = outline_rectangle(hull, theta[KAPPA])
         theta, noise = fit_heights(inside, shape, theta)
+        slopes = np.hypot(*shape.plane_values(theta)[:, :2].T)
+        reach_m = HULL_SIGMAS * noise.sigma * math.hypot(1.0, float(slopes.mean()))
     return replace(estimate, theta=theta, noise=noise)
 
 
