@@ -13,109 +13,27 @@ import shapely
 from ..compiled import compiled
 from ..geometry.arrays import sort_values
 
+SMOOTH_M = 0.08  # Roughness (m) at which a neighbourhood counts half.
+SLOPE_WIDTH_RAD = math.radians(8.3)  # Slopes further off the common direction hardly count.
+SLOPES = 0.08, 2.5  # Gentler slopes show no direction, steeper ones are walls.
 # rad within which edges support a direction of an outline, and whose mean it is
 PEAK_RAD, NEAR_PEAK_RAD = math.radians(3.0), math.radians(5.0)
 
 
-@compiled
-def nearest(points, i, indices, distances):
-    """Write the indices of the points nearest to point `i`, and count them.
+def slope_direction(points: np.ndarray, queries: int, neighbours: int) -> tuple[float, float]:
+    """Return the direction (rad) that the slopes have in common, and a confidence of 0 to 1.
 
-    The point itself is included.
-
-    `points` ascend in x.
-
-    Searches outwards on both sides of `i` and ends a side where x alone is too far.
+    It is the four-fold harmonic of the azimuths of slopes at about `queries` of the points (n, 3 or
+    more), each of so many `neighbours`. Steep and smooth neighbourhoods count more.
     """
-    indices[0], distances[0], count, farthest = i, 0.0, 1, np.inf
-    for direction in (-1, 1):
-        j = i + direction
-        while 0 <= j < len(points):
-            dx, dy, dz = (
-                points[j, 0] - points[i, 0],
-                points[j, 1] - points[i, 1],
-                points[j, 2] - points[i, 2],
-            )
-            if dx * dx >= farthest:
-                break
-            squared = dx * dx + dy * dy + dz * dz
-            if squared < farthest:
-                if count < len(indices):
-                    count += 1
-                k = count - 1
-                while k > 0 and distances[k - 1] > squared:
-                    distances[k], indices[k] = distances[k - 1], indices[k - 1]
-                    k -= 1
-                distances[k], indices[k] = squared, j
-                if count == len(indices):
-                    farthest = distances[count - 1]
-            j += direction
-    return count
+    from ..segment.sampling import find_harmonic, local_surfaces  # with scipy.spatial
 
-
-@compiled
-def local_slope(points, indices):
-    """Return (a, b, mean squared residual) of a least-squares plane.
-
-    It goes through `points[indices]`.
-
-    NaN where they are a line.
-    """
-    centre = np.zeros(3)
-    for j in indices:
-        centre += points[j, :3] / len(indices)
-    xx = xy = yy = xz = yz = zz = 0.0
-    for j in indices:
-        x, y, z = points[j, 0] - centre[0], points[j, 1] - centre[1], points[j, 2] - centre[2]
-        xx += x * x
-        xy += x * y
-        yy += y * y
-        xz += x * z
-        yz += y * z
-        zz += z * z
-    determinant = xx * yy - xy * xy
-    if determinant < 1e-3 * (xx + yy) ** 2 or determinant <= 0.0:
-        return np.nan, np.nan, np.nan
-    a, b = (xz * yy - yz * xy) / determinant, (yz * xx - xz * xy) / determinant
-    return a, b, max(zz - a * xz - b * yz, 0.0) / len(indices)
-
-
-@compiled
-def slope_direction(points, queries, neighbours):
-    """Return (kappa, confidence 0..1) of the slopes' common direction.
-
-    It is that of the four-fold harmonic of the azimuths of local slopes, at about `queries` points.
-
-    Steep and well-fitted neighbourhoods count more; twice re-weighted towards the peak. `points`
-    (n, 3 or more) ascend in x.
-    """
-    stride = max(1, len(points) // queries)
-    azimuths, weights = np.empty(len(points)), np.empty(len(points))
-    indices, distances = np.empty(neighbours, np.int64), np.empty(neighbours)
-    count = 0
-    for i in range(0, len(points), stride):
-        result = nearest(points, i, indices, distances)
-        a, b, squared = local_slope(points, indices[:result])
-        slope = math.hypot(a, b)
-        if 0.08 < slope < 2.5:
-            azimuths[count], weights[count] = (
-                math.atan2(b, a),
-                min(slope, 1.0) / (1.0 + squared / 0.0064),
-            )
-            count += 1
-    kappa, sharpness, confidence = 0.0, 0.0, 0.0
-    for _ in range(3):
-        real = imaginary = total = 0.0
-        for k in range(count):
-            angle = 4.0 * (azimuths[k] - kappa)
-            w = weights[k] * math.exp(sharpness * (math.cos(angle) - 1.0))
-            real += w * math.cos(angle)
-            imaginary += w * math.sin(angle)
-            total += weights[k]
-        kappa += math.atan2(imaginary, real) / 4.0
-        confidence = math.hypot(real, imaginary) / (total + 1e-9)
-        sharpness = 6.0
-    return kappa, confidence
+    order = np.arange(0, len(points), max(1, len(points) // queries))
+    x, y, z, roughness = local_surfaces(points[:, :3], order, neighbours)[:, :4].T
+    slope = np.hypot(x, y) / np.maximum(z, 1e-9)
+    weight = np.minimum(slope, 1.0) / (1.0 + (roughness / SMOOTH_M) ** 2)
+    is_roof = (slope > SLOPES[0]) & (slope < SLOPES[1])
+    return find_harmonic(np.arctan2(y, x)[is_roof], weight[is_roof], SLOPE_WIDTH_RAD)
 
 
 @compiled

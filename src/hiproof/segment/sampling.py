@@ -101,7 +101,7 @@ def farthest_points(xyz, count):
     return order, cover
 
 
-def local_surfaces(xyz, order):
+def local_surfaces(xyz, order, neighbours=SURFACE_NEIGHBOURS):
     """Describe the surface around each of `order` (s,) points of a cloud, as rows of seven.
 
     It follows from the nearest points: the upward normal of their plane (3), the roughness across
@@ -112,7 +112,7 @@ def local_surfaces(xyz, order):
     call it vertical.
     """
     places = xyz[order]
-    distances, nearest = find_nearest(xyz, places, min(SURFACE_NEIGHBOURS, len(xyz)))
+    distances, nearest = find_nearest(xyz, places, min(neighbours, len(xyz)))
     around = xyz[nearest]
     means = around.mean(axis=1)
     off = around - means[:, None]
@@ -145,13 +145,7 @@ def find_canonical_axes(x, y, surface):
     to which the roof falls more.
     """
     weight = (surface[:, 0] ** 2 + surface[:, 1] ** 2) * np.exp(-surface[:, 3] / 0.1)
-    azimuth, kappa = np.arctan2(surface[:, 1], surface[:, 0]), 0.0
-    for turn in range(3):
-        aside = azimuth - kappa
-        aside -= math.pi / 2 * np.round(aside / (math.pi / 2))
-        nearby = weight * np.exp(-((aside / HARMONIC_WIDTH) ** 2)) if turn else weight
-        real, imaginary = nearby @ np.cos(4 * aside), nearby @ np.sin(4 * aside)
-        kappa += math.atan2(imaginary, real) / 4
+    kappa, _ = find_harmonic(np.arctan2(surface[:, 1], surface[:, 0]), weight)
     cosine, sine = math.cos(kappa), math.sin(kappa)
     if np.var(cosine * y - sine * x) > np.var(cosine * x + sine * y):
         cosine, sine = -sine, cosine
@@ -160,6 +154,22 @@ def find_canonical_axes(x, y, surface):
     if (along if abs(along) > abs(across) else across) < 0:
         cosine, sine = -cosine, -sine
     return cosine, sine
+
+
+def find_harmonic(azimuth, weight, width=HARMONIC_WIDTH):
+    """Return the four-fold harmonic of directions (n,), re-weighted twice, and their share near it.
+
+    Directions, harmonic and the `width` within which they count are in radians.
+    """
+    kappa, share = 0.0, 0.0
+    for turn in range(3):
+        aside = azimuth - kappa
+        aside -= math.pi / 2 * np.round(aside / (math.pi / 2))
+        nearby = weight * np.exp(-((aside / width) ** 2)) if turn else weight
+        real, imaginary = nearby @ np.cos(4 * aside), nearby @ np.sin(4 * aside)
+        kappa += math.atan2(imaginary, real) / 4
+        share = math.hypot(real, imaginary) / (weight.sum() + 1e-9)
+    return kappa, share
 
 
 def group_points(xyz, centres, sources, count, radius):
