@@ -6,7 +6,7 @@ import shapely
 
 from hiproof.fit.prices import compute_unit
 from hiproof.fit.roof import fit_building, improve_all, start_roof
-from hiproof.fit.roof.accept import fit_roof, make_known, try_move
+from hiproof.fit.roof.accept import fit_roof, try_move
 from hiproof.fit.roof.draw import (
     compute_height,
     compute_heights,
@@ -14,7 +14,7 @@ from hiproof.fit.roof.draw import (
     make_drawing,
 )
 from hiproof.fit.roof.moves import LEAVE_OUT, MOVE_COLUMNS, list_moves
-from hiproof.fit.roof.price import price_roof
+from hiproof.fit.roof.price import know, price_roof
 from hiproof.fit.roof.site import make_site, split_convex
 from hiproof.fit.roof.tables import (
     VOLUME_COUNT,
@@ -75,7 +75,7 @@ def price(roof, site):
 def try_exactly(roof, trial, move, site):
     changed, box = np.zeros(len(roof.sides), bool), np.empty(4)
     drawing = make_drawing(len(roof.sides))
-    return try_move(roof, trial, move, site, drawing, make_known(), changed, box, True)
+    return try_move(roof, trial, move, site, drawing, know(roof, drawing, site), changed, box, True)
 
 
 @pytest.mark.parametrize("kind", COMPOUND_KINDS)

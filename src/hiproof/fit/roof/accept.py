@@ -7,19 +7,21 @@ best first, each judged again on the roof as it then is.
 
 from __future__ import annotations
 
-from collections import namedtuple
-
 import numpy as np
 
 from ...compiled import compiled
 from .draw import meets
 from .moves import MOVE_COLUMNS, SHARE, TO_POINTS, apply_move, list_moves
 from .price import (
+    count_known_units,
     fit_unknowns,
+    know,
+    know_change,
     list_points,
     list_unknowns,
     list_view,
     price_drawing,
+    price_known,
     price_misfit,
     price_roof,
     price_tables,
@@ -36,29 +38,6 @@ MOST_MOVES = 20_000  # Most moves in a round.
 FIRST_JUDGES = 400  # Most points of a box that judge a move first. Of more, every k-th does.
 # What they say errs by so much (units): more than what a move saves that changes little.
 SMALL_UNITS = 1.5
-KEPT_BOXES = 32  # Boxes whose price is kept.
-
-Known = namedtuple("Known", "boxes samples sizes weights misfits units next")
-"""What is known of boxes (q, 4) of the roof as it is.
-
-Of each: the points and cells that judge it first, `samples` (q, FIRST_JUDGES) of `sizes` (q,), each
-for `weights` (q,) points, its misfit (points, by these), and its units with those of the tables.
-`next` (1,) is the place that is used next.
-"""
-
-
-@compiled
-def make_known():
-    """Return room for what is known of boxes."""
-    return Known(
-        np.full((KEPT_BOXES, 4), np.nan),
-        np.zeros((KEPT_BOXES, FIRST_JUDGES), np.int64),
-        np.zeros(KEPT_BOXES, np.int64),
-        np.zeros(KEPT_BOXES),
-        np.zeros(KEPT_BOXES),
-        np.zeros(KEPT_BOXES),
-        np.zeros(1, np.int64),
-    )
 
 
 @compiled
@@ -89,31 +68,6 @@ def widen_box(box, other):
 
 
 @compiled
-def know_box(roof, drawing, site, box, known):
-    """Return the place in `known` of a box of the roof as it is."""
-    for q in range(KEPT_BOXES):
-        if (
-            known.boxes[q, 0] == box[0]
-            and known.boxes[q, 1] == box[1]
-            and known.boxes[q, 2] == box[2]
-            and known.boxes[q, 3] == box[3]
-        ):
-            return q
-    q = known.next[0]
-    known.next[0] = (q + 1) % KEPT_BOXES
-    points = list_points(site, box)
-    step = 1 + (len(points) - 1) // FIRST_JUDGES
-    sample = points[::step]
-    view = list_view(roof, box)
-    known.boxes[q] = box
-    known.samples[q, : len(sample)] = sample
-    known.sizes[q], known.weights[q] = len(sample), len(points) / max(len(sample), 1)
-    known.misfits[q] = known.weights[q] * price_misfit(roof, site, view, sample)
-    known.units[q] = price_drawing(roof, drawing, view, site, box) + price_tables(roof)
-    return q
-
-
-@compiled
 def try_move(roof, trial, move, site, drawing, known, changed, box, exact):
     """Apply a move to a copy of the roof, fit it, and return what it saves (points).
 
@@ -124,32 +78,30 @@ def try_move(roof, trial, move, site, drawing, known, changed, box, exact):
     if not has_room(trial) or not apply_move(trial, move, site, changed):
         return 0.0
     measure_change(roof, trial, changed, site, box)
-    q = know_box(roof, drawing, site, box, known)
-    weight, misfit, units = known.weights[q], known.misfits[q], known.units[q]
-    view = list_view(trial, box)
+    view, points = list_view(trial, box), list_points(site, box)
     if len(view) == 0:
         return 0.0
-    if weight == 1.0 or not exact:
-        points, values = known.samples[q, : known.sizes[q]], trial.values.copy()
-        gain = judge(trial, site, drawing, view, box, points, weight, misfit, units)
+    units = count_known_units(known, box)
+    if len(points) > FIRST_JUDGES and not exact:
+        sample = points[:: 1 + (len(points) - 1) // FIRST_JUDGES].copy()
+        values, weight = trial.values.copy(), len(points) / len(sample)
+        gain = judge(trial, site, drawing, view, box, sample, weight, known.costs, units)
         is_small = move[0] == SHARE or move[0] == TO_POINTS
-        if weight == 1.0 or not is_small or abs(gain) >= SMALL_UNITS * site.unit:
+        if not is_small or abs(gain) >= SMALL_UNITS * site.unit:
             return gain
         trial.values[:] = values
         for m in range(len(view)):
             place_planes(trial, view[m])
-    points = list_points(site, box)
-    misfit = price_misfit(roof, site, list_view(roof, box), points)
-    return judge(trial, site, drawing, view, box, points, 1.0, misfit, units)
+    return judge(trial, site, drawing, view, box, points, 1.0, known.costs, units)
 
 
 @compiled
-def judge(trial, site, drawing, view, box, points, weight, misfit, units):
+def judge(trial, site, drawing, view, box, points, weight, costs, units):
     """Fit a trial in a box to points, each for `weight`, and return what it saves (points).
 
-    `misfit` (points) and `units` are those of the roof as it is.
+    `costs` (n + g,) and `units` are those of the roof as it is.
     """
-    limit = misfit + site.unit * (units - price_tables(trial))
+    limit = weight * costs[points].sum() + site.unit * (units - price_tables(trial))
     hope = limit + HOPE_UNITS * site.unit
     if weight * price_misfit(trial, site, view, points) > hope:
         return 0.0
@@ -176,43 +128,54 @@ def fit_roof(roof, site, rounds):
 
 
 @compiled
+def touch(roof, box, touched):
+    """Mark the volumes that reach into a box, or nearly so."""
+    x0, x1, y0, y1 = box[0] - CHANGE_MARGIN_M, box[1] + CHANGE_MARGIN_M, box[2], box[3]
+    for k in range(roof.counts[VOLUME_COUNT]):
+        touched[k] |= meets(roof.boxes[k], x0, x1, y0 - CHANGE_MARGIN_M, y1 + CHANGE_MARGIN_M)
+
+
+@compiled
 def improve(roof, trial, site, drawing, asked, rounds):
     """Improve a roof by moves that concern volumes `asked` (v,), until none saves.
 
     Returns its price (points).
     """
-    known = make_known()
     size = len(roof.sides)
     changed, box = np.zeros(size, np.bool_), np.empty(4)
     touched = np.zeros(size, np.bool_)
     moves, gains = np.empty((MOST_MOVES, MOVE_COLUMNS), np.int64), np.empty(MOST_MOVES)
+    lowest, least = np.inf, LEAST_UNITS * site.unit
     for _ in range(rounds):
         fit_roof(roof, site, FIT_ROUNDS)
-        known.boxes[:] = np.nan
+        known = know(roof, drawing, site)
+        price = price_known(known, site)
+        if price > lowest - least:
+            break
+        lowest = price
         count = list_moves(roof, site, asked, moves)
         for m in range(count):
             gains[m] = try_move(roof, trial, moves[m], site, drawing, known, changed, box, False)
-        order, has_improved = np.argsort(-gains[:count]), False
+        order = np.argsort(-gains[:count])
         touched[:] = False
         for q in range(count):
             m = order[q]
-            if gains[m] <= LEAST_UNITS * site.unit:
+            if gains[m] <= least:
                 break
-            gain = try_move(roof, trial, moves[m], site, drawing, known, changed, box, True)
-            if gain <= LEAST_UNITS * site.unit:
+            if try_move(roof, trial, moves[m], site, drawing, known, changed, box, True) <= least:
                 continue
+            for k in range(trial.counts[VOLUME_COUNT]):
+                if changed[k]:
+                    touch(trial, trial.boxes[k], touched)
+                    if k < roof.counts[VOLUME_COUNT]:
+                        touch(trial, roof.boxes[k], touched)
             copy_tables(trial, roof)
-            known.boxes[:] = np.nan
-            has_improved = True
-            for k in range(roof.counts[VOLUME_COUNT]):
-                if roof.n_planes[k] > 0 and meets(roof.boxes[k], box[0], box[1], box[2], box[3]):
-                    touched[k] = True
-        if not has_improved:
-            break
+            known = know_change(roof, drawing, site, box, known)
         place = 0
         for k in range(roof.counts[VOLUME_COUNT]):
             if roof.n_planes[k] > 0:
                 asked[place] = touched[k]
                 place += 1
+        asked[place:] = False
         pack(roof)
     return price_roof(roof, drawing, site)

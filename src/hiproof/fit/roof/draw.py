@@ -366,47 +366,55 @@ def list_places(drawing, box):
 
 
 @compiled
-def count_corners(roof, drawing, box):
-    """Count the corners of a drawn roof in a `box` (4,), at all levels."""
+def list_corners(roof, drawing, box):
+    """Return the places (n, 2) of a drawn roof's corners in a `box` (4,), one for each level."""
     xs, ys = list_places(drawing, box)
-    planes, covers = np.empty(MOST_AT_PLACE, np.int64), np.empty(MOST_AT_PLACE)
-    heights, levels = np.empty(MOST_AT_PLACE), np.empty(MOST_AT_PLACE)
-    total = 0
+    out, total, levels = np.empty((len(xs), 2)), 0, np.empty(MOST_AT_PLACE)
     for i in range(len(xs)):
-        x, y, met = xs[i], ys[i], 0
-        for f in range(drawing.count[0]):
-            if not (
-                drawing.boxes[f, 0] <= x <= drawing.boxes[f, 1]
-                and drawing.boxes[f, 2] <= y <= drawing.boxes[f, 3]
-            ):
-                continue
-            cover = measure_cover(drawing.rings[f], drawing.sizes[f], x, y)
-            if cover == 0.0:
-                continue
-            k, p = drawing.owners[f, 0], drawing.owners[f, 1]
-            number, place = drawing.numbers[k, p], 0
-            while place < met and planes[place] != number:
-                place += 1
-            if place < met:
-                covers[place] += cover
-            elif met < MOST_AT_PLACE:
-                planes[met], covers[met] = number, cover
-                row = roof.planes[k, p]
-                heights[met] = row[0] * x + row[1] * y + row[2]
-                met += 1
-        count = 0
-        for place in range(met):
-            turn = covers[place] % np.pi
-            if min(turn, np.pi - turn) < STRAIGHT_RAD:
-                continue
-            is_new = True
-            for level in range(count):
-                is_new = is_new and abs(levels[level] - heights[place]) >= ONE_LEVEL_M
-            if is_new:
-                levels[count] = heights[place]
-                count += 1
+        count = find_levels(roof, drawing, xs[i], ys[i], levels)
+        while total + count > len(out):
+            out = np.concatenate((out, np.empty_like(out)))
+        out[total : total + count, 0], out[total : total + count, 1] = xs[i], ys[i]
         total += count
-    return total
+    return out[:total]
+
+
+@compiled
+def find_levels(roof, drawing, x, y, levels):
+    """Set the heights of the corners at a place of a drawn roof. Returns their number."""
+    planes, covers = np.empty(MOST_AT_PLACE, np.int64), np.empty(MOST_AT_PLACE)
+    heights, met, count = np.empty(MOST_AT_PLACE), 0, 0
+    for f in range(drawing.count[0]):
+        if not (
+            drawing.boxes[f, 0] <= x <= drawing.boxes[f, 1]
+            and drawing.boxes[f, 2] <= y <= drawing.boxes[f, 3]
+        ):
+            continue
+        cover = measure_cover(drawing.rings[f], drawing.sizes[f], x, y)
+        if cover == 0.0:
+            continue
+        k, p = drawing.owners[f, 0], drawing.owners[f, 1]
+        number, place = drawing.numbers[k, p], 0
+        while place < met and planes[place] != number:
+            place += 1
+        if place < met:
+            covers[place] += cover
+        elif met < MOST_AT_PLACE:
+            planes[met], covers[met] = number, cover
+            row = roof.planes[k, p]
+            heights[met] = row[0] * x + row[1] * y + row[2]
+            met += 1
+    for place in range(met):
+        turn = covers[place] % np.pi
+        if min(turn, np.pi - turn) < STRAIGHT_RAD:
+            continue
+        is_new = True
+        for level in range(count):
+            is_new = is_new and abs(levels[level] - heights[place]) >= ONE_LEVEL_M
+        if is_new:
+            levels[count] = heights[place]
+            count += 1
+    return count
 
 
 @compiled
@@ -478,36 +486,55 @@ def compute_heights(roof, view, x, y, reach, heights, volumes):
 
 
 @compiled
-def measure_low_steps(roof, drawing, view, box):
-    """Return the length (m) of low steps in a `box`."""
+def list_low_steps(roof, drawing, view, box):
+    """Return the stretches (n, 3) of low steps in a `box`: x and y of a middle, and the length.
+
+    Edges are cut at multiples of a length from the foot of the line that they lie on, so that one
+    stretch is the same however far a fragment reaches.
+    """
+    xs, ys, tops, lengths = sample_edges(roof, drawing, box)
+    heights, out, total = np.empty(len(xs)), np.empty((len(xs), 3)), 0
+    compute_heights(roof, view, xs, ys, 0.0, heights, np.empty(len(xs), np.int64))
+    for i in range(len(xs)):
+        if SEEN_STEP_M < tops[i] - heights[i] < LOW_STEP_TOP_M:
+            out[total, 0], out[total, 1], out[total, 2] = xs[i], ys[i], lengths[i]
+            total += 1
+    return out[:total]
+
+
+@compiled
+def sample_edges(roof, drawing, box):
+    """Return places x, y (n,) just outside the fragments' edges in a box.
+
+    With them come the fragments' heights there, and the lengths (m) of the stretches.
+    """
     most = 0
     for f in range(drawing.count[0]):
         around = 2.0 * (drawing.boxes[f, 1] - drawing.boxes[f, 0])
         around += 2.0 * (drawing.boxes[f, 3] - drawing.boxes[f, 2])
-        most += drawing.sizes[f] + int(around / STEP_SAMPLE_M)
+        most += 2 * drawing.sizes[f] + int(around / STEP_SAMPLE_M)
     xs, ys, tops, lengths, count = np.empty(most), np.empty(most), np.empty(most), np.empty(most), 0
     for f in range(drawing.count[0]):
         size, row = drawing.sizes[f], roof.planes[drawing.owners[f, 0], drawing.owners[f, 1]]
         x0, y0 = drawing.rings[f, size - 1, 0], drawing.rings[f, size - 1, 1]
         for i in range(size):
             x1, y1 = drawing.rings[f, i, 0], drawing.rings[f, i, 1]
-            ex, ey = x1 - x0, y1 - y0
-            length = np.sqrt(ex * ex + ey * ey)
-            samples = max(1, int(length / STEP_SAMPLE_M)) if length > 2.0 * ONE_PLACE_M else 0
-            for q in range(samples):
-                t = (q + 0.5) / samples
-                x = x0 + t * ex + EDGE_OFFSET_M * ey / length
-                y = y0 + t * ey - EDGE_OFFSET_M * ex / length
-                if box[0] < x < box[1] and box[2] < y < box[3]:
-                    xs[count], ys[count], lengths[count] = x, y, length / samples
-                    tops[count] = row[0] * x + row[1] * y + row[2]
-                    count += 1
+            length = np.sqrt((x1 - x0) ** 2 + (y1 - y0) ** 2)
+            if length > 2.0 * ONE_PLACE_M:
+                a, b = (x1 - x0) / length, (y1 - y0) / length
+                start = a * x0 + b * y0
+                first, last = np.floor(start / STEP_SAMPLE_M), (start + length) / STEP_SAMPLE_M
+                for q in range(int(np.ceil(last) - first)):
+                    low = max(STEP_SAMPLE_M * (first + q) - start, 0.0)
+                    high = min(STEP_SAMPLE_M * (first + q + 1.0) - start, length)
+                    t = 0.5 * (low + high)
+                    x, y = x0 + t * a + EDGE_OFFSET_M * b, y0 + t * b - EDGE_OFFSET_M * a
+                    if box[0] < x < box[1] and box[2] < y < box[3]:
+                        xs[count], ys[count], lengths[count] = x, y, high - low
+                        tops[count] = row[0] * x + row[1] * y + row[2]
+                        count += 1
             x0, y0 = x1, y1
-    heights, total = np.empty(count), 0.0
-    compute_heights(roof, view, xs[:count], ys[:count], 0.0, heights, np.empty(count, np.int64))
-    for i in range(count):
-        total += lengths[i] if SEEN_STEP_M < tops[i] - heights[i] < LOW_STEP_TOP_M else 0.0
-    return total
+    return xs[:count], ys[:count], tops[:count], lengths[:count]
 
 
 @compiled

@@ -15,6 +15,7 @@ from .tables import N_SIDES, measure_middle
 REACH_M = 2.5  # Distance (m) from a side within which it may lie instead.
 FEWEST = 4  # Fewest points on either side of a line that points show.
 MOST = 600  # Most points that are asked. Of more, every k-th is.
+BIN_M = 0.02  # Width (m) of a bin of points.
 LEANS = 12  # Ways to lean to either side.
 LEAN_STEP = 0.02  # Steps (rise over run) in which a line leans.
 
@@ -46,6 +47,8 @@ def find_end(roof, k, s, site):
         if turn > 2 * LEANS:  # at last, beside the best
             lean = middle + (0.5 if turn % 2 else -0.5) * LEAN_STEP
         places = across - lean * along
+        if bound_right(places, is_on, n_on) <= best:
+            continue
         order = np.argsort(places)
         right = n_on
         for i in range(count - 1):
@@ -60,6 +63,20 @@ def find_end(roof, k, s, site):
     norm = np.sqrt(d * d + e * e)
     f = c - best_end + best_lean * (b * x - a * y)
     return d / norm, e / norm, f / norm
+
+
+@compiled
+def bound_right(places, is_on, n_on):
+    """Return no fewer than the most points (n,) that an end tells apart, without sorting them."""
+    low = places.min()
+    steps = np.zeros((int((places.max() - low) / BIN_M) + 1, 2), np.int64)
+    for i in range(len(places)):
+        steps[int((places[i] - low) / BIN_M), int(is_on[i])] += 1
+    right, most = n_on, n_on
+    for b in range(len(steps)):
+        most = max(most, right + steps[b, 0])
+        right += steps[b, 0] - steps[b, 1]
+    return most
 
 
 @compiled

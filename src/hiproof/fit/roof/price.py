@@ -20,7 +20,7 @@ from ..prices import (
     VOLUME_UNITS,
 )
 from ..union.objective import compute_cell_cost, compute_point_cost
-from .draw import compute_heights, count_corners, draw, measure_low_steps, meets
+from .draw import compute_heights, draw, list_corners, list_low_steps, meets
 from .tables import LINE_COUNT, N_SIDES, ONE_PLANE, UNKNOWN_COUNT, VOLUME_COUNT, place_planes
 
 OVER_M = 0.03  # Points so far (m) beside a volume are over it.
@@ -45,13 +45,21 @@ Site = namedtuple(
 - keeps_shapes: whether volumes keep their planes, because not all types may be built.
 """
 
+Known = namedtuple("Known", "costs corners steps units")
+"""What is known of a roof as it is.
+
+What each point and cell costs (n + g,), where its corners (c, 2) and low steps (s, 3) are, and the
+units (1,) of its tables.
+"""
+
 
 @compiled
 def list_view(roof, box):
-    """Return the numbers of the volumes that reach into a box."""
+    """Return the numbers of the volumes that reach into a box, or to the points in it."""
     out, count = np.empty(roof.counts[VOLUME_COUNT], np.int64), 0
+    x0, x1, y0, y1 = box[0] - OVER_M, box[1] + OVER_M, box[2] - OVER_M, box[3] + OVER_M
     for k in range(roof.counts[VOLUME_COUNT]):
-        if roof.n_planes[k] > 0 and meets(roof.boxes[k], box[0], box[1], box[2], box[3]):
+        if roof.n_planes[k] > 0 and meets(roof.boxes[k], x0, x1, y0, y1):
             out[count] = k
             count += 1
     return out[:count]
@@ -63,12 +71,12 @@ def list_points(site, box):
     first = np.searchsorted(site.x[: site.n], box[0])
     last = np.searchsorted(site.x[: site.n], box[1])
     out, count = np.empty(last - first + len(site.x) - site.n, np.int64), 0
-    for i in range(first, last):
-        if box[2] < site.y[i] < box[3]:
-            out[count] = i
-            count += 1
-    for i in range(site.n, len(site.x)):
-        if box[0] < site.x[i] < box[1] and box[2] < site.y[i] < box[3]:
+    x, y, x0, x1, y0, y1 = site.x, site.y, box[0], box[1], box[2], box[3]
+    for i in range(first, last):  # a number that does not count is overwritten by the next
+        out[count] = i
+        count += (y[i] > y0) & (y[i] < y1)
+    for i in range(site.n, len(x)):
+        if x0 < x[i] < x1 and y0 < y[i] < y1:
             out[count] = i
             count += 1
     return out[:count]
@@ -88,28 +96,33 @@ def compute_judged_heights(roof, site, view, points):
 
 
 @compiled
-def price_misfit(roof, site, view, points):
-    """Return what the points and cells of the numbers `points` cost."""
+def compute_costs(roof, site, view, points):
+    """Return what each (n,) of the points and cells of the numbers `points` costs."""
     heights, _, n = compute_judged_heights(roof, site, view, points)
-    total = 0.0
+    costs = np.empty(len(points))
     for m in range(n):
         z = site.z[points[m]]
         gap = min(abs(z - heights[m]), site.dead) / site.dead
-        total += compute_point_cost(z, heights[m], site.dead, site.width)
-        total += SMALL_GAP_POINTS * gap * gap
+        costs[m] = compute_point_cost(z, heights[m], site.dead, site.width)
+        costs[m] += SMALL_GAP_POINTS * gap * gap
     for m in range(n, len(points)):
         i = points[m]
-        total += compute_cell_cost(heights[m], site.weight[i], site.shade[i], site.low, site.high)
-    return total
+        costs[m] = compute_cell_cost(heights[m], site.weight[i], site.shade[i], site.low, site.high)
+    return costs
+
+
+@compiled
+def price_misfit(roof, site, view, points):
+    """Return what the points and cells of the numbers `points` cost."""
+    return compute_costs(roof, site, view, points).sum()
 
 
 @compiled
 def price_drawing(roof, drawing, view, site, box):
     """Return the units of the corners and low steps that are drawn in a box."""
     draw(roof, drawing, view, site, box)
-    return CORNER_UNITS * count_corners(roof, drawing, box) + LOW_STEP_UNITS * measure_low_steps(
-        roof, drawing, view, box
-    )
+    steps = list_low_steps(roof, drawing, view, box)
+    return CORNER_UNITS * len(list_corners(roof, drawing, box)) + LOW_STEP_UNITS * steps[:, 2].sum()
 
 
 @compiled
@@ -141,25 +154,87 @@ def price_tables(roof):
 @compiled
 def count_skew_planes(roof, k):
     """Count the planes of volume k that are nearly, but not quite, square to the first."""
-    count, is_first, a, b = 0, True, 0.0, 0.0
+    count, is_first, a, b, lines = 0, True, 0.0, 0.0, roof.lines
     for p in range(roof.n_planes[k]):
         if roof.slopes[k, p] < 0:
             continue
-        line = roof.lines[abs(roof.plane_lines[k, p]) - 1]
+        l = abs(roof.plane_lines[k, p]) - 1
         if is_first:
-            a, b, is_first = line[0], line[1], False
-        off = min(abs(a * line[0] + b * line[1]), abs(a * line[1] - b * line[0]))
+            a, b, is_first = lines[l, 0], lines[l, 1], False
+        off = min(abs(a * lines[l, 0] + b * lines[l, 1]), abs(a * lines[l, 1] - b * lines[l, 0]))
         count += int(ONE_PLANE < off < MOST_SKEW)
     return count
 
 
 @compiled
+def know(roof, drawing, site):
+    """Return what is known of a roof."""
+    box = np.array([-np.inf, np.inf, -np.inf, np.inf])
+    view = list_view(roof, box)
+    draw(roof, drawing, view, site, box)
+    return Known(
+        compute_costs(roof, site, view, np.arange(len(site.x))),
+        list_corners(roof, drawing, box),
+        list_low_steps(roof, drawing, view, box),
+        np.array([price_tables(roof)]),
+    )
+
+
+@compiled
+def know_change(roof, drawing, site, box, known):
+    """Return what is known of a roof that has changed in a box."""
+    view, points = list_view(roof, box), list_points(site, box)
+    draw(roof, drawing, view, site, box)
+    known.costs[points] = compute_costs(roof, site, view, points)
+    return Known(
+        known.costs,
+        replace_inside(known.corners, list_corners(roof, drawing, box), box),
+        replace_inside(known.steps, list_low_steps(roof, drawing, view, box), box),
+        np.array([price_tables(roof)]),
+    )
+
+
+@compiled
+def replace_inside(rows, new, box):
+    """Return rows of places, with new ones instead of those in a box."""
+    is_kept = np.ones(len(rows), np.bool_)
+    for m in range(len(rows)):
+        is_kept[m] = not lies_in(rows, m, box)
+    return np.concatenate((rows[is_kept], new))
+
+
+@compiled
+def lies_in(rows, m, box):
+    return (
+        (rows[m, 0] > box[0])
+        & (rows[m, 0] < box[1])
+        & (rows[m, 1] > box[2])
+        & (rows[m, 1] < box[3])
+    )
+
+
+@compiled
+def count_known_units(known, box):
+    """Return the units of the tables, and of the known corners and low steps in a box."""
+    corners, length = 0, 0.0
+    for m in range(len(known.corners)):
+        corners += lies_in(known.corners, m, box)
+    for m in range(len(known.steps)):
+        length += known.steps[m, 2] if lies_in(known.steps, m, box) else 0.0
+    return known.units[0] + CORNER_UNITS * corners + LOW_STEP_UNITS * length
+
+
+@compiled
+def price_known(known, site):
+    """Return the price (points) of the roof that is known."""
+    everywhere = np.array([-np.inf, np.inf, -np.inf, np.inf])
+    return known.costs.sum() + site.unit * count_known_units(known, everywhere)
+
+
+@compiled
 def price_roof(roof, drawing, site):
     """Return the price (points) of a roof."""
-    box = np.array([-np.inf, np.inf, -np.inf, np.inf])
-    view, points = list_view(roof, box), list_points(site, box)
-    units = price_tables(roof) + price_drawing(roof, drawing, view, site, box)
-    return price_misfit(roof, site, view, points) + site.unit * units
+    return price_known(know(roof, drawing, site), site)
 
 
 @compiled
