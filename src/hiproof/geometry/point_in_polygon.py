@@ -37,7 +37,11 @@ def find_inside(area: shapely.Geometry, x: np.ndarray, y: np.ndarray) -> np.ndar
     if len(starts) > MOST_OWN_CORNERS:
         shapely.prepare(area)
         return np.asarray(shapely.intersects_xy(area, x, y))
-    return mark_inside(np.ascontiguousarray(x, float), np.ascontiguousarray(y, float), starts, ends)
+    inside = np.zeros(len(x), bool)
+    x0, y0, x1, y1 = area.bounds
+    near = np.flatnonzero((x >= x0) & (x <= x1) & (y >= y0) & (y <= y1))
+    inside[near] = mark_inside(np.asarray(x[near], float), np.asarray(y[near], float), starts, ends)
+    return inside
 
 
 @compiled

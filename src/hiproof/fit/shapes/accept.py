@@ -84,13 +84,28 @@ class PartsRoof:
         units = np.array([count_units([part], self.outline) for part in self.parts])
         return np.maximum(seen, 1), units
 
+    def find_near(self, centre: np.ndarray, radius: float) -> np.ndarray:
+        """Return the numbers (k,) of the points in a disc."""
+        first, last = np.searchsorted(self.points[:, 0], (centre[0] - radius, centre[0] + radius))
+        return first + np.flatnonzero(
+            np.hypot(*(self.points[first:last, :2] - centre).T) <= radius
+        )
+
+    def find_seen(self, parts: list[Part]) -> np.ndarray:
+        """Return the numbers (k,) of the points at which one of the `parts` is the highest."""
+        is_one = np.array([any(one is part for part in parts) for one in self.parts])
+        return np.flatnonzero(is_one[self.highest[1]])
+
     def select_under(self, within: np.ndarray) -> np.ndarray:
-        """Return which parts are seen mostly at the points `within` (n,)."""
-        seen = np.bincount(self.highest[1], within, len(self.parts))
+        """Return which parts are seen mostly at the points of the numbers `within` (k,)."""
+        seen = np.bincount(self.highest[1][within], minlength=len(self.parts))
         return seen >= UNDER_SHARE * self.shares[0]
 
     def is_worth(self, within: np.ndarray, misfit: float, count: int = 0) -> bool:
-        """Return whether a shape with a misfit and `count` numbers can save at points `within`."""
+        """Return whether a shape with a misfit and `count` numbers can save at points `within`.
+
+        These are given by number (k,).
+        """
         under = self.select_under(within)
         units = self.shares[1][under].sum() - LEAST_UNITS - UNKNOWN_UNITS * count
         return bool(self.misfits[within].sum() + self.unit * units > misfit)
@@ -105,7 +120,8 @@ class PartsRoof:
 def make_parts_roof(
     parts: list[Part], points: np.ndarray, outline: shapely.Polygon, settings: Settings
 ) -> PartsRoof:
-    """Return the roof of parts with the prices of a cloud (n, 3)."""
+    """Return the roof of parts with the prices of a cloud (n, 3), whose points ascend by x then."""
+    points = points[np.argsort(points[:, 0], kind="stable")]
     unit = compute_unit(len(points) / outline.area, settings.compound)
     return PartsRoof(parts, points, outline, unit, settings.compound.tolerance_m)
 
@@ -118,12 +134,11 @@ def count_units(parts: list[Part], outline: shapely.Polygon) -> float:
     numbers = sum(1 + len(part.parameters.keys() - {"width", "length"}) for part in parts)
     rims = [outline, *(rim for part in parts if is_disc(part) for rim in part.outlines)]
     straight = [rim for part in parts if not is_disc(part) for rim in part.outlines]
-    xy = np.unique(np.round(shapely.get_coordinates(straight), 2), axis=0)
-    is_free = np.ones(len(xy), bool)
+    places = np.unique(shapely.get_coordinates(straight).round(2) @ (1.0, 1.0j))
+    corners = shapely.points(places.real, places.imag)
     for rim in rims:
-        is_free &= ~shapely.dwithin(shapely.points(xy), rim.boundary, SAME_CORNER_M)
-    corners = int(np.count_nonzero(is_free))
-    return VOLUME_UNITS * len(parts) + UNKNOWN_UNITS * numbers + CORNER_UNITS * corners
+        corners = corners[~shapely.dwithin(corners, rim.boundary, SAME_CORNER_M)]
+    return VOLUME_UNITS * len(parts) + UNKNOWN_UNITS * numbers + CORNER_UNITS * len(corners)
 
 
 def is_disc(part: Part) -> bool:
@@ -150,14 +165,24 @@ def accept(roof: PartsRoof, shapes: Iterable[tuple[Part, int]]) -> PartsRoof:
 
 
 def accept_all(
-    roof: PartsRoof, list_shapes: Callable[[PartsRoof], Iterable[tuple[Part, int]]]
+    roof: PartsRoof, list_shapes: Callable[[PartsRoof, list[Part]], Iterable[tuple[Part, int]]]
 ) -> PartsRoof:
-    """Return the roof with one of the listed shapes after the other, until none saves."""
-    for _ in range(len(roof.parts)):
-        better = accept(roof, list_shapes(roof))
-        if better is roof:
-            break
-        roof = better
+    """Return the roof with listed shapes, each where it saves, the one that saves most first.
+
+    Shapes are listed for parts: at first for all, then for those at what has changed.
+    """
+    asked = roof.parts
+    while asked:
+        saving = []
+        for shape in list_shapes(roof, asked):
+            better = accept(roof, [shape])
+            if better is not roof:
+                saving.append((better.price, shape))
+        before = roof.parts
+        for _, shape in sorted(saving, key=lambda pair: pair[0]):
+            roof = accept(roof, [shape])
+        new = exclude_parts(roof.parts, before)
+        asked = select_touching(roof.parts, unite_outlines(new)) if new else []
     return roof
 
 
@@ -167,9 +192,9 @@ def list_roofs(roof: PartsRoof, shape: Part) -> Iterator[list[Part]]:
     What other parts cover under it is theirs, or is cut off.
     """
     over, _ = find_highest([shape], roof.points[:, :2])
-    within, top, plan = np.isfinite(over), roof.highest[1], unite_outlines([shape])
-    changes = np.where(within, roof.price_gaps(roof.points[:, 2] - over) - roof.misfits, 0.0)
-    costs = np.bincount(top, changes, len(roof.parts))
+    within, plan = np.flatnonzero(np.isfinite(over)), unite_outlines([shape])
+    changes = roof.price_gaps(roof.points[within, 2] - over[within]) - roof.misfits[within]
+    costs = np.bincount(roof.highest[1][within], changes, len(roof.parts))
     is_under = roof.select_under(within) & (costs <= roof.unit * roof.shares[1])
     replaced = [part for part, under in zip(roof.parts, is_under, strict=True) if under]
     kept = exclude_parts(roof.parts, replaced)

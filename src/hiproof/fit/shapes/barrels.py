@@ -31,11 +31,10 @@ def list_barrels(roof: PartsRoof, part: Part, settings: Settings) -> Iterator[tu
     beside = [p for p in roof.parts if np.abs(find_ends(p, along) - ends).max() <= ENDS_M]
     x = roof.points[:, :2] @ (-along[1], along[0])
     for group in [[part], beside] if len(beside) > 1 else [[part]]:
-        is_member = np.array([any(p is member for member in group) for p in roof.parts])
-        which = is_member[roof.highest[1]]
-        gaps = measure_arc_gaps(x[which], roof.points[which, 2])
+        seen = roof.find_seen(group)
+        gaps = measure_arc_gaps(x[seen], roof.points[seen, 2])
         covered = list_polygons(unite_outlines(group))
-        if len(covered) == 1 and roof.is_worth(which, roof.price_gaps(gaps).sum()):
+        if len(covered) == 1 and roof.is_worth(seen, roof.price_gaps(gaps).sum()):
             yield from ((vault, 0) for vault in fit_over(roof, covered[0], ["barrel"], settings))
 
 

@@ -35,17 +35,17 @@ def fit_curved_shapes(
     for arc in find_arcs(outline):
         drums = list_arc_drums(roof, arc) if "flat" in names else ()
         roof = accept(roof, chain(drums, list_arc_shapes(roof, arc, names)))
-    return accept_all(roof, lambda one: list_part_shapes(one, names, settings)).parts
+    return accept_all(roof, lambda one, asked: list_part_shapes(one, asked, names, settings)).parts
 
 
 def list_part_shapes(
-    roof: PartsRoof, names: list[str], settings: Settings
+    roof: PartsRoof, asked: list[Part], names: list[str], settings: Settings
 ) -> Iterator[tuple[Part, int]]:
-    """Yield shapes that may take the place of each part and those around it."""
+    """Yield shapes that may take the place of each part in `asked` and those around it."""
     rounds = [name for name in names if name in ROUND]
-    for k, part in enumerate(roof.parts):
-        own = roof.highest[1] == k
-        if np.count_nonzero(own) < FEWEST_CURVE_POINTS:
+    for part in asked:
+        own = roof.find_seen([part])
+        if len(own) < FEWEST_CURVE_POINTS:
             continue
         if "flat" in names:
             yield from list_drums(roof, part, own)

@@ -33,7 +33,7 @@ def fit_custom_shapes(parts: list[Part], points: np.ndarray, settings: Settings)
     outline = unite_outlines(parts)
     points = points[shapely.intersects_xy(outline, points[:, 0], points[:, 1])]
     roof = make_parts_roof(parts, points, outline, settings)
-    return accept_all(roof, lambda one: list_custom_shapes(one, names, settings)).parts
+    return accept_all(roof, lambda one, asked: list_custom_shapes(one, asked, names, settings)).parts
 
 
 def list_custom_names(allowed: tuple[str, ...]) -> list[str]:
@@ -47,10 +47,10 @@ def list_custom_names(allowed: tuple[str, ...]) -> list[str]:
 
 
 def list_custom_shapes(
-    roof: PartsRoof, names: list[str], settings: Settings
+    roof: PartsRoof, asked: list[Part], names: list[str], settings: Settings
 ) -> Iterator[tuple[Part, int]]:
-    """Yield custom shapes over parts that roof a rectangle together."""
-    others = [part for part in roof.parts if part.type not in names]
+    """Yield custom shapes over parts in `asked` that roof a rectangle together."""
+    others = [part for part in asked if part.type not in names]
     for count in range(1, MOST_REPLACED_PARTS + 1):
         for group in combinations(others, count):
             covered = list_polygons(unite_outlines(group))

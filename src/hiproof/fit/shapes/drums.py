@@ -19,6 +19,7 @@ from .arcs import TURRET_DEG, Arc, cut_to_outline
 from .regions import select_touching, unite_outlines
 
 BEYOND_DRUM = 1.5  # Points within so many radii show the step.
+DRUM_NUMBERS = 3  # A circle has a middle and a radius.
 CIRCLE_ROUNDS = 3  # Rounds in which the circle is found.
 EDGE_SOFTNESS_M = (0.3, 0.2, 0.1, 0.05)  # How far off its side (m) points may lie, round by round.
 FEWEST_LEVEL_POINTS = 12  # Fewer show no circle.
@@ -43,27 +44,29 @@ def list_drums(roof: PartsRoof, part: Part, own: np.ndarray) -> Iterator[tuple[P
         for other in select_touching(roof.parts, unite_outlines([part]))
         if other.type == "flat" and abs(other.translation[2] - level) <= SAME_LEVEL_M
     ]
-    is_level = np.array([any(other is one for one in group) for other in roof.parts])
-    for start in (own, is_level[roof.highest[1]]):
-        circle, right_share = find_circle(roof.points, level, start)
+    for start in (own, roof.find_seen(group)):
+        circle, right_share = find_circle(roof, level, start)
         drum = make_drum(circle[:2], float(circle[2]), level)
         if right_share > 0.0 and shapely.covers(roof.outline, drum.outlines[0]):
-            yield drum, 3
+            yield drum, DRUM_NUMBERS
 
 
-def find_circle(points: np.ndarray, level: float, start: np.ndarray) -> tuple[np.ndarray, float]:
-    """Find the circle that best separates the points (n, 3) at a level from others.
+def find_circle(roof: PartsRoof, level: float, start: np.ndarray) -> tuple[np.ndarray, float]:
+    """Find the circle that best separates the points at a level from others.
 
-    It begins with the disc that has the middle and the spread of the points `start` (n,). Returns
+    It begins with the disc that has the middle and the spread of the points `start` (k,). Returns
     its middle and radius (3,), and which share of the points around the start is on its right side.
     It is given up, and the share is 0, where too few are. Each step is one of a logistic fit:
     points nearer to the circle count more, the more so the smaller its softness.
     """
-    centre = points[start, :2].mean(axis=0)
-    squares = ((points[:, :2] - centre) ** 2).sum(axis=1)
-    circle = np.array([*centre, math.sqrt(2.0 * squares[start].mean())])
-    disc = points[squares <= (BEYOND_DRUM * circle[2]) ** 2]
+    centre = roof.points[start, :2].mean(axis=0)
+    squares = ((roof.points[start, :2] - centre) ** 2).sum(axis=1)
+    circle = np.array([*centre, math.sqrt(2.0 * squares.mean())])
+    near = roof.find_near(centre, BEYOND_DRUM * circle[2])
+    disc = roof.points[near]
     sign = np.where(np.abs(disc[:, 2] - level) <= SAME_LEVEL_M, 1.0, -1.0)
+    if not roof.is_worth(near, roof.misfits[near[sign < 0.0]].sum(), DRUM_NUMBERS):
+        return circle, 0.0
     right_share = measure_right_share(disc, sign, circle)
     for softness in EDGE_SOFTNESS_M:
         if right_share < HOPELESS_SHARE:

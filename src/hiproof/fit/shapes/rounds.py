@@ -50,6 +50,7 @@ CIRCLE_NUMBERS = 3  # A circle has a middle and a radius.
 FEWEST_POINTS = 6  # A slope and a height, and as many points again to check them.
 CENTRE_ROUNDS = 3  # Rounds in which the middle of a disc is found.
 RIDGE = 1e-6  # It keeps what no point determines.
+GROWTH = 3.0  # A shape reaches out to so many times the radius with which it begins at most.
 GROWTH_ROUNDS = 2  # Rounds in which a shape is fitted to all points that follow it.
 FOLLOW_M = 0.12  # Distance (m), at right angles, within which a point follows a slope.
 SLOPES_TRIED, BENDS_TRIED = 24, 7  # Slopes, in equal ratios, and bends of an onion that are tried.
@@ -85,10 +86,10 @@ def list_arc_shapes(roof: PartsRoof, arc: Arc, names: list[str]) -> Iterator[tup
 def list_top_shapes(
     roof: PartsRoof, part: Part, own: np.ndarray, names: list[str]
 ) -> Iterator[tuple[Part, int]]:
-    """Yield round shapes around the top of a part, which is seen at the points `own` (n,)."""
+    """Yield round shapes around the top of a part, which is seen at the points `own` (k,)."""
     start, wide = roof.points[own, :2].mean(axis=0), math.sqrt(part.area / math.pi)
     for radius in (share * wide for share in RADII):
-        centre, disc = find_centre(roof.points, start, radius)
+        centre, disc = find_centre(roof, start, radius)
         if not roof.is_worth(disc, 0.0, CIRCLE_NUMBERS):
             continue
         misfit = roof.price_gaps(measure_round_gaps(roof.points[disc], centre)).sum()
@@ -99,7 +100,8 @@ def list_top_shapes(
         theta = np.array([*centre, part.kappa, radius, radius, 0.0, 0.0, 0.0, 0.0])
         for name in names:
             shape, free = CATALOGUE[name], ROUND_SHAPES[name].free
-            fitted = fit_followers(roof.points, shape, theta, free, HALF_WIDTH not in free)
+            around = roof.points[roof.find_near(centre, GROWTH * radius)]
+            fitted = fit_followers(around, shape, theta, free, HALF_WIDTH not in free)
             if fitted is not None:
                 ring = fitted.pieces[0].outline
                 common = shapely.intersection(ring, roof.outline, grid_size=OVERLAY_GRID_M)
@@ -111,24 +113,20 @@ def list_top_shapes(
 
 
 def find_centre(
-    points: np.ndarray, centre: np.ndarray, radius: float
+    roof: PartsRoof, centre: np.ndarray, radius: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the middle (2,) of what rises above the rest of a disc of points (n, 3), and which.
+    """Return the middle (2,) of what rises above the rest of a disc of points, and these (k,).
 
     It begins with the disc around a `centre`.
     """
-    # A round moves the middle by a radius at most, so no other points matter.
-    reach, (x, y) = CENTRE_ROUNDS * radius, points[:, :2].T
-    around = np.flatnonzero((np.abs(x - centre[0]) <= reach) & (np.abs(y - centre[1]) <= reach))
-    some = points[around]
+    disc = roof.find_near(centre, radius)
     for _ in range(CENTRE_ROUNDS):
-        near = np.hypot(*(some[:, :2] - centre).T) <= radius
-        if not near.any():
+        if not len(disc):
             break
-        above = np.maximum(some[near, 2] - some[near, 2].mean(), 0.01)
-        centre = above @ some[near, :2] / above.sum()
-    disc = np.zeros(len(points), bool)
-    disc[around[near]] = True
+        x, y, z = roof.points[disc].T
+        above = np.maximum(z - z.mean(), 0.01)
+        centre = np.array([above @ x, above @ y]) / above.sum()
+        disc = roof.find_near(centre, radius)
     return centre, disc
 
 
