@@ -66,7 +66,7 @@ COVER_M = 0.3  # Least distance (m) of a side from the wall to which its volume 
 MOST_LINES = 7  # Most lines to which a side is moved.
 RUN_ON_STEPS_M = (0.6, 1.5, 3.0)  # Distances (m) by which a side is run on.
 MOST_SHARED_M = (
-    15.0  # A part of a roof so wide (m) is priced whole. What lies beyond keeps its value.
+    40.0  # A part of a roof so wide (m) is priced whole. What lies beyond keeps its value.
 )
 SAME_FAR = 0.03  # The same of volumes that are not near each other.
 ALIKE_SLOPES, ALIKE_HEIGHTS_M = 0.2, 0.7  # Unknowns (rise over run, m) nearer than this may be one.
