@@ -300,27 +300,31 @@ class Primitive:
     def plane_values(self, theta: np.ndarray) -> np.ndarray:
         """Return the planes (k, 3) over u, v at `theta` (9,), in the order of `faces`.
 
-        A plane is z = a u + b v + c.
+        A plane is z = a u + b v + c. Of several theta (m, 9), they are (m, k, 3).
         """
-        shape = np.asarray(theta, float)[HALF_WIDTH:].tolist()
-        return np.array(
-            [[coefficient.at(shape) for coefficient in plane] for plane in self.plane_formulas]
-        )
+        theta = np.asarray(theta, float)
+        shape = theta[HALF_WIDTH:].tolist() if theta.ndim == 1 else list(theta.T[HALF_WIDTH:])
+        zero = 0.0 * theta[..., HALF_WIDTH]
+        planes = [[zero + number.at(shape) for number in plane] for plane in self.plane_formulas]
+        return np.moveaxis(np.array(planes), (0, 1), (-2, -1))
 
     @cached_property
     def plane_formulas(self) -> tuple[tuple[Formula, ...], ...]:
         """`planes` with every number a Formula."""
         return tuple(tuple(formula(coefficient) for coefficient in plane) for plane in self.planes)
 
-    def height_at(self, theta: np.ndarray, xy: np.ndarray) -> np.ndarray:
-        """Return the height (n,) of the roof `theta` at `xy` (n, 2).
+    def height_at(
+        self, theta: np.ndarray, xy: np.ndarray, planes: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Return the height (n,) of the roof `theta`, or of its `planes`, at `xy` (n, 2).
 
         The roof is continued beyond its plan rectangle.
         """
+        planes = self.plane_values(theta) if planes is None else planes
         c, s = math.cos(theta[KAPPA]), math.sin(theta[KAPPA])
         xy_centred = np.asarray(xy, float) - theta[:2]
         u, v = xy_centred @ (c, s), xy_centred @ (-s, c)
-        heights = np.stack([u, v, np.ones_like(u)], axis=1) @ self.plane_values(theta).T
+        heights = np.stack([u, v, np.ones_like(u)], axis=1) @ planes.T
         if self.strips == 1:
             return np.max([z.min(axis=0) for z in self.split_planes(heights.T)], axis=0)
         half_width = theta[HALF_WIDTH]

@@ -87,9 +87,7 @@ class PartsRoof:
     def find_near(self, centre: np.ndarray, radius: float) -> np.ndarray:
         """Return the numbers (k,) of the points in a disc."""
         first, last = np.searchsorted(self.points[:, 0], (centre[0] - radius, centre[0] + radius))
-        return first + np.flatnonzero(
-            np.hypot(*(self.points[first:last, :2] - centre).T) <= radius
-        )
+        return first + np.flatnonzero(np.hypot(*(self.points[first:last, :2] - centre).T) <= radius)
 
     def find_seen(self, parts: list[Part]) -> np.ndarray:
         """Return the numbers (k,) of the points at which one of the `parts` is the highest."""

@@ -33,7 +33,9 @@ def fit_custom_shapes(parts: list[Part], points: np.ndarray, settings: Settings)
     outline = unite_outlines(parts)
     points = points[shapely.intersects_xy(outline, points[:, 0], points[:, 1])]
     roof = make_parts_roof(parts, points, outline, settings)
-    return accept_all(roof, lambda one, asked: list_custom_shapes(one, asked, names, settings)).parts
+    return accept_all(
+        roof, lambda one, asked: list_custom_shapes(one, asked, names, settings)
+    ).parts
 
 
 def list_custom_names(allowed: tuple[str, ...]) -> list[str]:

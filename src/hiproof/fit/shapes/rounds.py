@@ -207,13 +207,13 @@ def find_start(
     (lowest, highest), *bends = shape.bounds
     values = [np.geomspace(lowest, highest, SLOPES_TRIED // (1 + len(bends)))]
     values += [np.linspace(*bend, BENDS_TRIED) for bend in bends]
-    best, most = theta, 0
-    for turn, *slopes in product(turns, *values):
-        trial = theta.copy()
+    trials = np.array([[*theta[:Q1], *some, *theta[Q1 + len(some) :]] for some in product(*values)])
+    planes, best, most = shape.plane_values(trials), theta, 0
+    for turn, m in product(turns, range(len(trials))):
+        trial = trials[m].copy()
         trial[KAPPA] += turn
-        trial[Q1 : Q1 + len(slopes)] = slopes
-        lows = np.sort(points[:, 2] - shape.height_at(trial, points[:, :2]))
-        width = 2.0 * FOLLOW_M * math.hypot(1.0, sum(slopes))
+        lows = np.sort(points[:, 2] - shape.height_at(trial, points[:, :2], planes[m]))
+        width = 2.0 * FOLLOW_M * math.hypot(1.0, trial[Q1 : Q1 + len(values)].sum())
         counts = np.searchsorted(lows, lows + width, side="right") - np.arange(len(lows))
         first = int(np.argmax(counts)) if len(counts) else 0
         if len(counts) and counts[first] > most:
