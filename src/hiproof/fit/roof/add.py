@@ -39,7 +39,6 @@ WINDOW_M = 20.0  # Size (m) of a place's window.
 EFFORT = Effort(pool_points=1200, seeds=200, regrown=0)
 TRIED = 2  # Candidates that join, and that replace, those that gain most.
 ROWS = np.array([1, 16, 16])  # Most volumes, lines and unknowns that a new volume takes.
-ROUNDS = 2  # Rounds of a new volume's moves before it is judged.
 
 
 def add_volumes(roof: Tables, trial: Tables, site: Site, drawing: Drawing, whole: Whole) -> bool:
@@ -84,7 +83,7 @@ def add_best(roof: Tables, trial: Tables, site: Site, drawing: Drawing, scene: S
         put_on_walls(new, k, site)
         asked = nobody.copy()
         asked[k] = True
-        cost = improve(new, trial, site, drawing, asked, ROUNDS)
+        cost = improve(new, trial, site, drawing, asked, 1)
         if cost < lowest:
             best, new, lowest = new, make_tables_like(roof), cost
     if best is not None:
