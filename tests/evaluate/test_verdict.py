@@ -2,6 +2,7 @@
 it, whatever hides that.
 """
 
+import dataclasses
 import json
 
 import numpy as np
@@ -149,6 +150,30 @@ def test_a_place_of_several_square_metres_off_the_roof_is_never_good(side_m, off
         points = np.column_stack([xy, 6.0 + is_off * off_m + rng.normal(0, 0.05, len(xy))])
         good.append(judge_model(block(6.0, outline), points).grade is Grade.GOOD)
     assert not any(good)
+
+
+@pytest.mark.parametrize("count", [10, 60, 150])
+@pytest.mark.parametrize("height", [1.0, 4.0, 12.0])
+def test_the_wall_of_a_taller_neighbour_says_nothing_of_a_roof(count, height):
+    """Its points lie over the outline, or a little to either side."""
+    rng = np.random.default_rng(8)
+    wall = rng.uniform((0, -0.2, 6), (12, 0.2, 6 + height), (count, 3))
+    assert judge_model(block(), np.concatenate([on_block(), wall])) == (Grade.GOOD, ())
+
+
+def test_points_outside_the_outline_say_nothing_of_a_roof():
+    beside = on_block() + [13.0, 0.0, 5.0]
+    assert judge_model(block(), np.concatenate([on_block(), beside])) == (Grade.GOOD, ())
+
+
+def test_points_over_a_place_that_no_part_covers_lie_above_the_ground_there():
+    """A part that could not become a valid solid was left out."""
+    whole = block()
+    left = dataclasses.replace(whole.roof, parts=block(6.0, shapely.box(0, 0, 7, 9)).roof.parts)
+    model = Model(left, compose(left, 0.0).move(left.frame.origin))
+    verdict = judge_model(model, on_block())
+    assert verdict.grade is Grade.POOR
+    assert any(reason.endswith("up to 6.1 m above the model") for reason in verdict.reasons)
 
 
 def stepped(step_x, high, size):

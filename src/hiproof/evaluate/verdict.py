@@ -6,7 +6,7 @@ way. All other points are roof points. Five findings speak against a model:
     off the roof    many roof points lie more than 0.2 m above or below it
     unseen          no roof point lies near a part of the outline
     above, below    in a place of several square metres most points lie off the roof, or a tower
-                    stands over it
+                    stands over it, farther inside than the walls of taller neighbours
     tilted          over a large part of the roof the points rise another way
     unsupported     a part of the roof has hardly any point: the model may have invented a level
 
@@ -23,13 +23,14 @@ from typing import NamedTuple
 import numpy as np
 
 from ..geometry.grid import number_cells
+from ..geometry.point_in_polygon import find_inside
 from ..log import count_things
 from ..model import WALL, Model
 from ..model.heights import find_highest
 from ..status import Doubt, Grade
 from .distance import point_surface_distances
 from .layers import unseen_share
-from .metrics import FACADE_M, NEAR_M
+from .metrics import FACADE_M, NEAR_M, well_inside
 
 LEAST_NEAR, POOR_NEAR = 0.75, 0.6
 """Share of the roof points within NEAR_M of the roof, below which a model is fair, and poor. Roofs
@@ -192,9 +193,12 @@ def collect_evidence(model: Model, points: np.ndarray, unused: np.ndarray) -> Ev
 
     See `judge_model`.
     """
-    roof, everything = model.roof, np.concatenate([points, unused])
+    roof = model.roof
+    points, unused = (p[find_inside(roof.outline, *p[:, :2].T)] for p in (points, unused))
+    everything = np.concatenate([points, unused])
     z_roof, part = find_highest(roof.parts, everything[:, :2])
-    dz = everything[:, 2] - z_roof
+    floor = model.solid.vertices[:, 2].min() - roof.frame.origin[2]
+    dz = everything[:, 2] - np.maximum(z_roof, floor)  # where no part is the model shows ground
     on_roof = np.abs(dz) < NEAR_M
     is_off = ~on_roof
     is_off[is_off] = point_surface_distances(everything[is_off], wall_rings(model)) >= FACADE_M
@@ -206,6 +210,7 @@ def collect_evidence(model: Model, points: np.ndarray, unused: np.ndarray) -> Ev
     is_guess = (shown_m2 > SMALL_PART_M2) & (support < FEWEST_ON_PART)
     spacing_m = math.sqrt(area_m2 / max(np.count_nonzero(counts), 1))
     seen, z_off = everything[counts], dz[counts]
+    inner = well_inside(seen, roof.outline).holds  # without walls of taller neighbours
     tilted = [
         shown_m2[k] * is_tilted(seen[member], z_off[member])
         for k in range(len(roof.parts))
@@ -215,7 +220,7 @@ def collect_evidence(model: Model, points: np.ndarray, unused: np.ndarray) -> Ev
         points=len(roof_points),
         near=float(on_roof[mask].sum() / max(len(roof_points), 1)),
         unseen=unseen_share(roof_points, roof.outline),
-        above=largest_cluster(seen, z_off, spacing_m, TALL_M),
+        above=largest_cluster(seen[inner], z_off[inner], spacing_m, TALL_M),
         below=largest_cluster(seen, -z_off, spacing_m),
         tilted_m2=float(sum(tilted)),
         unsupported_m2=float(shown_m2[is_guess].sum()),
