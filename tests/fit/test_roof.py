@@ -47,9 +47,9 @@ def begin_roof(kind, seed=0):
     volumes, _, scene = find_volumes(plan, outline, settings)
     plan_outline = shapely.transform(outline, plan.frame.uv_plan)
     site = make_site(scene, plan_outline, compute_unit(plan.density, settings), plan.border)
-    roof = start_roof(volumes, outline, plan, scene)
+    roof = start_roof(volumes, scene, site)
     fit_roof(roof, site, 2)
-    return roof, site, plan_outline, (volumes, outline, plan, scene)
+    return roof, site, plan_outline, (volumes, scene, site)
 
 
 def list_all_moves(roof, site):

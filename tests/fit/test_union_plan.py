@@ -1,4 +1,4 @@
-"""Check what becomes of volumes: sides, regions, and composite shapes."""
+"""Check what becomes of volumes: sides and composite shapes."""
 
 import math
 from dataclasses import replace
@@ -7,13 +7,15 @@ import numpy as np
 import pytest
 import shapely
 
+from hiproof.fit.roof.site import make_site
+from hiproof.fit.roof.start import make_roof, put_on_walls
 from hiproof.fit.shapes.composite import combine_parts
 from hiproof.fit.union.allowed import list_allowed_shapes
 from hiproof.fit.union.plan import lay_out_plan
 from hiproof.fit.union.scene import make_scene
-from hiproof.fit.union.sides import Side, choose_sides, gather_lines
 from hiproof.fit.union.volumes import (
     U0,
+    U1,
     V1,
     compute_roof_heights,
     make_base,
@@ -21,7 +23,7 @@ from hiproof.fit.union.volumes import (
 from hiproof.model import Part, Piece
 from hiproof.primitives import get
 from hiproof.primitives.family import Member
-from union_scenes import OUTLINES, list_corners
+from union_scenes import list_corners
 
 
 def lay_out_scene(rng, outline, volumes=None):
@@ -39,19 +41,30 @@ def lay_out_scene(rng, outline, volumes=None):
     return plan, scene
 
 
-# --- regions --------------------------------------------------------------------------------------
-
-
 # --- sides ----------------------------------------------------------------------------------------
 
 
-def test_a_side_away_from_all_lines_stays_where_the_search_left_it():
-    outline = OUTLINES[0]
+@pytest.mark.parametrize(
+    "end, drawn_end, place",
+    [
+        (1.3, 1.3, 1.3),  # away from all walls
+        (4.0, 3.8, 4.0),  # a little beside one
+        (4.0, 4.2, 4.0),
+        (3.2, 3.2, 3.2),  # near one, but where the points are
+    ],
+)
+def test_a_side_lies_on_a_wall_near_it_unless_points_lie_elsewhere(end, drawn_end, place):
+    block = shapely.box(-4.0, -4.0, 4.0, 4.0)
+    outline = block | shapely.box(4.0, -4.0, 7.0, 0.0) | shapely.box(-7.0, 0.0, -4.0, 4.0)
     volumes = np.vstack([make_base(-5.0), make_base(2.0)])
-    volumes[1, U0 : V1 + 1] = -6.0, 1.3, -4.0, 4.0
+    volumes[1, U0 : V1 + 1] = -4.0, end, -4.0, 4.0
     plan, scene = lay_out_scene(np.random.default_rng(0), outline, volumes)
-    side = choose_sides(volumes, gather_lines(outline, plan, scene.turn), scene)[1][1]
-    assert side == Side(1.3)
+    site = make_site(scene, shapely.transform(outline, plan.frame.uv_plan), 3.0, np.zeros((3, 0)))
+    volumes[1, U1] = drawn_end
+    roof = make_roof(volumes, scene.turn, True)
+    put_on_walls(roof, 1, site)
+    ends = -roof.half_planes[1, :2, 2] * roof.half_planes[1, :2, 0]
+    assert ends == pytest.approx([-4.0, place], abs=1e-9)
 
 
 # --- larger shapes --------------------------------------------------------------------------------

@@ -18,7 +18,7 @@ from hiproof.fit.union.candidates import (
 )
 from hiproof.fit.union.edges import MIN_SIDE_M, move_edges
 from hiproof.fit.union.grow import prepare_growth
-from hiproof.fit.union.improve import digest_surroundings, improve, simplify
+from hiproof.fit.union.improve import digest_surroundings, improve
 from hiproof.fit.union.moves import (
     FEWEST_SEEDS,
     count_seeds,
@@ -445,7 +445,6 @@ MOVES = {
     ),
     "refit": refit_volumes,
     "improve": lambda volumes, scene, value: improve(volumes, scene, value, SLOPES, 2),
-    "simplify": lambda volumes, scene, value: simplify(volumes, scene, value, 0.6),
 }
 
 

@@ -19,6 +19,10 @@ LEAN_UNITS = 1.0  # A line with a direction of its own.
 CORNER_UNITS = 0.5  # A corner of the drawn roof, at any level.
 LOW_STEP_UNITS = 0.23  # A metre of a step lower than half a metre.
 
+# Where a side of a volume of the search begins: along no line of the outline, between two of its
+# corners, each metre off.
+LOOSE_UNITS, CHORD_UNITS, OFF_UNITS_A_METRE = 2.0, 0.3, 0.1
+
 
 def compute_unit(density: float, settings) -> float:
     """Compute the points that one unit of structure must explain, at a density (points/m2).

@@ -47,18 +47,6 @@ def counterclockwise(ring: shapely.LinearRing) -> np.ndarray:
     return shapely.get_coordinates(ring)[:: 1 if shapely.is_ccw(ring) else -1]
 
 
-def is_convex(outline: shapely.Polygon) -> bool:
-    """Return whether a valid outline has no hole and no corner that points inwards.
-
-    >>> is_convex(shapely.box(0, 0, 2, 1)), is_convex(shapely.box(0, 0, 3, 1) - shapely.box(1, 0, 2,
-    ...     0.5))
-    (True, False)
-    """
-    x, y = np.diff(counterclockwise(outline.exterior), axis=0).T
-    turns = x * np.append(y[1:], y[0]) - y * np.append(x[1:], x[0])
-    return not outline.interiors and bool((turns >= 0.0).all())
-
-
 def ring_edges(area: shapely.Geometry) -> tuple[np.ndarray, np.ndarray]:
     """Return starts and ends (m, 2) of all edges of one or several polygons."""
     if area.geom_type == "Polygon" and not area.interiors:

@@ -41,14 +41,13 @@ def moves() -> None:
     Moves come first, so that `planes` is ready elsewhere when it is needed.
     """
     from ...fit.roof import fit_building
-    from ...fit.union.improve import improve, simplify
+    from ...fit.union.improve import improve
     from ...fit.union.objective import compute_objective
     from ...fit.union.volumes import make_base
 
     scene, base = make_house_scene()[1], make_base(-3.0)
     value = compute_objective(base, scene, np.inf)
     improve(base, scene, value, np.array([0.7]), 1)
-    simplify(base, scene, value, 0.1)
     fit_building(house(), L_OUTLINE)
 
 

@@ -46,7 +46,6 @@ from ..union.plan import Plan, lay_out_plan
 from ..union.prices import LARGE_ROOF_M2
 from ..union.scene import VISIBLE_DEPTH_M, Scene, place_nodes
 from ..union.search import find_volumes
-from ..union.sides import choose_sides, gather_lines
 from ..union.whole import Whole
 from .accept import LOOP_ROUNDS, improve
 from .add import add_volumes
@@ -58,8 +57,8 @@ from .parts import name_planes
 from .price import Site
 from .regions import list_places
 from .site import make_site
-from .start import make_roof
-from .tables import Tables, copy_tables, make_tables_like
+from .start import make_roof, put_on_walls
+from .tables import VOLUME_COUNT, Tables, copy_tables, make_tables_like
 
 __all__ = ["BuildingFit", "fit_building"]
 
@@ -120,7 +119,7 @@ def name_volumes(
     types = settings.fit.types
     keeps_shapes = bool(types) and not {*CATALOGUE} <= {*types, *CURVED}
     site = make_site(scene, plan_outline, unit, plan.border, keeps_shapes)
-    roof = start_roof(volumes, outline, plan, scene)
+    roof = start_roof(volumes, scene, site)
     whole = Whole(scene, plan, outline) if outline.area > LARGE_ROOF_M2 else None
     roof, site = improve_beside(roof, site, whole)
     return read_parts(roof, site, plan_outline, plan, types)
@@ -151,10 +150,12 @@ def improve_all(roof: Tables, trial: Tables, site: Site, drawing: Drawing) -> fl
     return improve(roof, trial, site, drawing, np.ones(len(roof.sides), np.bool_), LOOP_ROUNDS)
 
 
-def start_roof(volumes: np.ndarray, outline: shapely.Polygon, plan: Plan, scene: Scene) -> Tables:
+def start_roof(volumes: np.ndarray, scene: Scene, site: Site) -> Tables:
     """Return the tables of the search's volumes along walls."""
-    sides = choose_sides(volumes, gather_lines(outline, plan, scene.turn), scene)
-    return make_roof(volumes, sides, scene.turn, is_base_visible(volumes, scene))
+    roof = make_roof(volumes, scene.turn, is_base_visible(volumes, scene))
+    for k in range(roof.counts[VOLUME_COUNT]):
+        put_on_walls(roof, k, site)
+    return roof
 
 
 def read_parts(

@@ -21,8 +21,7 @@ from ..union.candidates import (
 from ..union.grow import prepare_growth
 from ..union.objective import compute_costs
 from ..union.scene import Scene
-from ..union.sides import Side
-from ..union.volumes import DIRECTION, REPLACES
+from ..union.volumes import DIRECTION, REPLACES, U0
 from ..union.whole import Box, Whole
 from ..union.window import open_window
 from .accept import LEAST_UNITS, improve
@@ -77,9 +76,9 @@ def add_best(roof: Tables, trial: Tables, site: Site, drawing: Drawing, scene: S
     nobody = np.zeros(len(roof.sides), np.bool_)
     lowest = improve(roof, trial, site, drawing, nobody, 1) - LEAST_UNITS * site.unit
     best, new = None, make_tables_like(roof)
-    for volume, ends in list_additions(roof, scene):
+    for volume in list_additions(roof, scene):
         copy_tables(roof, new)
-        k = add_volume(new, volume, [Side(end) for end in ends], scene.turn)
+        k = add_volume(new, volume, scene.turn)
         put_on_walls(new, k, site)
         asked = nobody.copy()
         asked[k] = True
@@ -91,8 +90,8 @@ def add_best(roof: Tables, trial: Tables, site: Site, drawing: Drawing, scene: S
     return best is not None
 
 
-def list_additions(roof: Tables, scene: Scene) -> Iterator[tuple[np.ndarray, list[float]]]:
-    """Yield volumes that may explain what a roof leaves, and their ends."""
+def list_additions(roof: Tables, scene: Scene) -> Iterator[np.ndarray]:
+    """Yield volumes that may explain what a roof leaves."""
     z = find_heights(roof, scene.U[0], scene.V[0])
     costs = compute_costs(z, scene)
     unexplained = np.flatnonzero(costs[: scene.n] > UNEXPLAINED)
@@ -108,7 +107,9 @@ def list_additions(roof: Tables, scene: Scene) -> Iterator[tuple[np.ndarray, lis
         for m in np.argsort(-gains, kind="stable")[:TRIED].tolist():
             if gains[m] > 0.0:
                 lines = scene.lines[int(candidates[m, DIRECTION])]
-                yield candidates[m], [float(lines[k // 2, rectangles[m, k]]) for k in range(4)]
+                for edge in range(4):
+                    candidates[m, U0 + edge] = lines[edge // 2, rectangles[m, edge]]
+                yield candidates[m]
 
 
 def find_heights(roof: Tables, x: np.ndarray, y: np.ndarray) -> np.ndarray:

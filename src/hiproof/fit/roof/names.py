@@ -11,9 +11,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..union.sides import Side
 from ..union.volumes import LEVEL
-from .parts import GIVEN_M, STRAIGHT, OutlineWall, Planes
+from .parts import GIVEN_M, STRAIGHT, OutlineWall, Planes, Side
 from .tables import N_SIDES, UNKNOWN_COUNT, Tables, read_line
 
 FACED = 0.9  # Cosine of the angle up to which a plane faces one of four axes.

@@ -13,7 +13,6 @@ import shapely
 from ...frames import PlanFrame
 from ...model import Part
 from ...primitives.family import AXIS, SIGN, Member, name_among
-from ..union.sides import Side
 from ..union.volumes import LEVEL, N_SIDES
 
 EACH = np.arange(N_SIDES)
@@ -30,6 +29,21 @@ REGISTERED_PLAN_M = 0.03
 REGISTERED_M = 0.01
 RAISED = np.array([[0.0], [0.0], [REGISTERED_M]])  # A plane (3, 1) changed by the latter.
 PROBE_M = 0.01  # Distance (m) that an end is moved to see which parameters depend on it.
+
+
+@dataclass(frozen=True)
+class Side:
+    """A line x = offset + lean * y in the axes of its volume's direction.
+
+    x is across the side, y along it. If it is `anchored` to the outline, its eave is where the
+    outline is. `sigma` (m) is the standard deviation of its place. It is 0 where the outline gives
+    the place, and infinite where no points determine it or other volumes hide it.
+    """
+
+    offset: float
+    lean: float = 0.0
+    anchored: bool = False
+    sigma: float = 0.0
 
 
 class OutlineWall(NamedTuple):

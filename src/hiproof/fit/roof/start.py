@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...compiled import compiled
+from ..prices import CHORD_UNITS, LOOSE_UNITS, OFF_UNITS_A_METRE
 from ..union.volumes import (
     ALL_EQUAL,
     DIRECTION,
@@ -14,11 +16,14 @@ from ..union.volumes import (
     REPLACES,
     SLOPE0,
     TIE,
+    U0,
+    V1,
 )
 from .moves import LINE_COSINE
-from .price import Site
+from .price import list_points, list_view, price_misfit
 from .tables import (
     FAR_M,
+    LINE_COUNT,
     N_SIDES,
     NO_UNKNOWN,
     VOLUME_COUNT,
@@ -29,56 +34,95 @@ from .tables import (
     make_tables,
     measure_middle,
     place_volume,
+    read_line,
 )
 
 ROOM = 2  # Room for so many times the volumes that there are.
-NEAR_WALL_M = 0.4  # A line of the outline so near (m) a new volume's side is that side.
+NEAR_WALL_M = 1.0  # A line of the outline so near (m) the middle of a side may be the side.
+MOST_SWING = 0.5 * np.sqrt(1.0 - LINE_COSINE**2)  # How far (of its length) an end then moves more.
+PARALLEL_COSINE = 1.0 - 1e-12  # Cosine of the angle up to which two lines are parallel.
 
 
-def make_roof(volumes: np.ndarray, sides: list, turns: np.ndarray, with_base: bool) -> Tables:
-    """Return the tables of volumes along their `sides`. The base is one `with_base`, or alone."""
+def make_roof(volumes: np.ndarray, turns: np.ndarray, with_base: bool) -> Tables:
+    """Return the tables of volumes. The base is one `with_base`, or alone."""
     numbers = [k for k in range(len(volumes)) if k > 0 or with_base or len(volumes) == 1]
     size = ROOM * len(numbers) + 8
     roof = make_tables(size, 8 * size, 8 * size)
     for k in numbers:
-        add_volume(roof, volumes[k], sides[k], turns)
+        add_volume(roof, volumes[k], turns)
     return roof
 
 
-def add_volume(roof: Tables, volume: np.ndarray, sides: list, turns: np.ndarray) -> int:
-    """Add a volume along its `sides`. Returns its number."""
+def add_volume(roof: Tables, volume: np.ndarray, turns: np.ndarray) -> int:
+    """Add a volume with the sides of its rectangle. Returns its number."""
     row = int(roof.counts[VOLUME_COUNT])
     roof.counts[VOLUME_COUNT] += 1
     roof.replaces[row], roof.n_planes[row] = volume[REPLACES] > 0, 0
     c, s = turns[int(volume[DIRECTION])]
     axes = np.array([[c, s], [-s, c]])
-    for edge, side in enumerate(sides):
-        line = np.array([1.0, -side.lean, -side.offset])
-        line *= (1.0 if edge % 2 == 0 else -1.0) / np.hypot(1.0, side.lean)
-        normal = line[:2] if edge < 2 else line[1::-1]
-        roof.sides[row, edge] = add_line(roof, *(normal @ axes), line[2])
-    add_planes(roof, row, volume, sides, axes)
+    for edge, place in enumerate(volume[U0 : V1 + 1].tolist()):
+        sign = 1.0 if edge % 2 == 0 else -1.0
+        roof.sides[row, edge] = add_line(roof, *(sign * axes[edge // 2]), -sign * place)
+    add_planes(roof, row, volume, axes)
     place_volume(roof, row)
     return row
 
 
-def put_on_walls(roof: Tables, k: int, site: Site) -> None:
-    """Put the sides of volume k on lines of the outline that lie near them."""
+@compiled
+def put_on_walls(roof, k, site):
+    """Put each side of volume k on the line of the outline near it that costs least, if any.
+
+    A line costs what points then miss, more the further it is off, and more if it is no edge of the
+    outline but joins two corners. Along none, a side costs a fixed sum.
+    """
     for s in range(N_SIDES):
         x, y, length = measure_middle(roof, k, s, site.bounds)
-        cosine = site.lines[:, :2] @ roof.half_planes[k, s, :2]
-        gap = np.abs(site.lines[:, :3] @ [x, y, 1.0])
-        gap[np.abs(cosine) < LINE_COSINE] = np.inf
-        m = int(np.argmin(gap)) if len(gap) and length > 0.0 else -1
-        if m >= 0 and gap[m] < NEAR_WALL_M:
-            sign = 1.0 if cosine[m] > 0.0 else -1.0
-            roof.sides[k, s] = add_line(roof, *(sign * site.lines[m, :3]))
-    place_volume(roof, k)
+        if length == 0.0:
+            continue
+        a, b, _ = roof.half_planes[k, s]
+        reach = NEAR_WALL_M + MOST_SWING * length
+        box = roof.boxes[k] + np.array([-reach, reach, -reach, reach])
+        view, points = list_view(roof, box), list_points(site, box)
+        start = best = roof.sides[k, s]
+        lowest = price_misfit(roof, site, view, points) + site.unit * LOOSE_UNITS
+        for line in site.lines:
+            cosine, gap = a * line[0] + b * line[1], abs(line[0] * x + line[1] * y + line[2])
+            if abs(cosine) < LINE_COSINE or gap > NEAR_WALL_M:
+                continue
+            count, sign = roof.counts[LINE_COUNT], 1.0 if cosine > 0.0 else -1.0
+            roof.sides[k, s] = add_line(roof, sign * line[0], sign * line[1], sign * line[2])
+            place_volume(roof, k)
+            units = OFF_UNITS_A_METRE * gap + (CHORD_UNITS if line[5] == 0.0 else 0.0)
+            price = price_misfit(roof, site, view, points) + site.unit * units
+            if price < lowest:
+                best, lowest = roof.sides[k, s], price
+            else:
+                roof.counts[LINE_COUNT] = count
+        roof.sides[k, s] = best
+        move_eaves(roof, k, start, best)
+        place_volume(roof, k)
 
 
-def add_planes(roof: Tables, row: int, volume: np.ndarray, sides: list, axes: np.ndarray) -> None:
+@compiled
+def move_eaves(roof, k, line, other):
+    """Let the planes of volume k that rise from a line rise from another, parallel to it.
+
+    They stay where they are.
+    """
+    a, b, c = read_line(roof, line)
+    d, e, f = read_line(roof, other)
+    if a * d + b * e < PARALLEL_COSINE:
+        return
+    for p in range(roof.n_planes[k]):
+        if roof.plane_lines[k, p] == line:
+            roof.plane_lines[k, p] = other
+            if roof.slopes[k, p] >= 0:
+                roof.values[roof.heights[k, p]] += roof.values[roof.slopes[k, p]] * (c - f)
+
+
+def add_planes(roof: Tables, row: int, volume: np.ndarray, axes: np.ndarray) -> None:
     """Add the planes of a volume: each rises from the middle of a side, equal slopes are shared."""
-    offsets = np.clip([side.offset for side in sides], -FAR_M, FAR_M)
+    offsets = np.clip(volume[U0 : V1 + 1], -FAR_M, FAR_M)
     middle = np.array([0.5 * (offsets[0] + offsets[1]), 0.5 * (offsets[2] + offsets[3])])
     slopes: dict[int, int] = {}
     ties = group_slopes(volume)

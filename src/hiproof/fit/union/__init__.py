@@ -22,11 +22,10 @@ facings     compiled: moves that turn its planes
 improve     compiled: all moves in turn
 add, grow   volumes added one by one to a level base, and the first of them grown anew
 trim        hidden edges drawn in
-search      these in order, and the simplification that a draughtsman would make
+search      these in order
 large       roofs of more than 200 m2, each block of which is searched as a house
 whole       what blocks need of a whole roof
 window      the scene of a box
 blocks      where a large roof is cut
-sides       each side on the line of the outline that it nearly follows
 fit         the outcome
 """

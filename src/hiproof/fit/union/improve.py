@@ -1,4 +1,4 @@
-"""Make all moves in turn while they lower the objective, and simplify. Compiled."""
+"""Make all moves in turn while they lower the objective. Compiled."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import math
 import numpy as np
 
 from ...compiled import compiled
-from ...geometry.arrays import measure_range
 from .around import measure_context
 from .edges import EVERYWHERE, NO_GAIN, move_edges
 from .facings import face_walls
@@ -19,13 +18,10 @@ from .moves import (
     flatten,
     move_all_edges,
     refit_volume,
-    refit_volumes,
-    remove_volume,
 )
 from .objective import compute_objective
-from .prices import BEGIN_SHARE, BEGIN_UNITS
 from .steps import enclose_volume
-from .volumes import DIRECTION, LEVEL, N_SIDES, OFFSET0, SETTLED, SLOPE0, U0, U1, V0, V1
+from .volumes import DIRECTION, LEVEL, OFFSET0, SETTLED, U0, U1, V0, V1
 
 DIGEST_REACH_M = 0.5  # Volumes nearer than this (m) belong to each other's surroundings.
 DIGEST_STEP = 0.02  # Smaller changes of metres and of slopes are none.
@@ -68,7 +64,7 @@ def improve(volumes, scene, value, slopes, rounds):
 def change_planes(volumes, scene, value, k, slopes):
     """Make all moves that change which planes volume k has, their ties and facings."""
     context = measure_context(volumes, scene.U, scene.V, scene.order, k)
-    volumes, value = drop_planes(volumes, scene, value, k, np.inf, context)
+    volumes, value = drop_planes(volumes, scene, value, k, context)
     volumes, value = flatten(volumes, scene, value, k, context)
     volumes, value = change_ties(volumes, scene, value, k, context)
     volumes, value = face_walls(volumes, scene, value, k, context)
@@ -119,32 +115,3 @@ def digest_surroundings(volumes, turn, k):
             term ^= term >> 29
         total += term
     return float(total & DIGEST_BITS) + 1.0
-
-
-@compiled
-def simplify(volumes, scene, value, steepest):
-    """Drop volumes and planes that do not pay under `scene`.
-
-    The scene is a more tolerant one. Planes steeper than `steepest` stay.
-    """
-    for _ in range(4):
-        value_before = value
-        k = 1
-        while k < len(volumes):
-            if measure_range(volumes[k, SLOPE0 : SLOPE0 + N_SIDES])[1] <= steepest:
-                trial = remove_volume(volumes, k)
-                trial_value = compute_objective(
-                    trial, scene, value + BEGIN_UNITS * scene.evidence + 2.0 * BEGIN_SHARE * scene.n
-                )
-                if trial_value < np.inf:
-                    trial_value = move_all_edges(trial, scene, trial_value, EVERYWHERE)
-                    trial, trial_value = refit_volumes(trial, scene, trial_value)
-                    if trial_value < value - NO_GAIN:
-                        volumes, value = trial, trial_value
-                        continue
-            context = measure_context(volumes, scene.U, scene.V, scene.order, k)
-            volumes, value = drop_planes(volumes, scene, value, k, steepest, context)
-            k += 1
-        if value > value_before - NO_GAIN:
-            break
-    return volumes, value

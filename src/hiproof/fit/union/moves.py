@@ -138,12 +138,10 @@ def drop_volumes(volumes, scene, value):
 
 
 @compiled
-def drop_planes(volumes, scene, value, k, steepest, context):
-    """Drop planes of volume k no steeper than `steepest` that do not pay."""
+def drop_planes(volumes, scene, value, k, context):
+    """Drop planes of volume k that do not pay."""
     for plane in range(N_PLANES):
         if volumes[k, OFFSET0 + plane] == np.inf or count_planes(volumes[k]) < 2:
-            continue
-        if plane < LEVEL and volumes[k, SLOPE0 + plane] > steepest:
             continue
         trial = volumes.copy()
         remove_plane(trial[k], plane)

@@ -63,9 +63,6 @@ EdgePrices = namedtuple("EdgePrices", "any_step a_metre low_a_metre low_step loo
 """
 EDGE_PRICES = EdgePrices(0.7, 0.08, 0.15, 0.5, 0.6, 0.5)  # in this order
 
-LOOSE_COST, UNSUPPORTED_COST, FAR_COST_A_METRE = 1.2, 0.3, 0.1
-"""A side along no line of the outline, one with no wall below, each metre off the line."""
-
 KIND_COST = np.array([1.0, 1.4, 1.4, 1.9])
 """A plane among the candidates: level, sloping along u, along v, and freely."""
 
@@ -73,7 +70,6 @@ KIND_COST = np.array([1.0, 1.4, 1.4, 1.9])
 
 FREE_UNITS, FREELY_UNITS = 1.5, 8.0  # a plane that faces no wall; a new volume with such a plane
 REGROWN_UNITS = 0.5  # a roof grown anew: less is gained by cutting finer, too
-LEANING_SIDE_UNITS = 1.0  # a side that leans as its points say, along no line of the outline
 
 # What a change may cost that a draughtsman would make, in units.
 

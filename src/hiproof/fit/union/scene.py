@@ -223,7 +223,7 @@ def make_lines(plan: Plan, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]
         lay_lines(x.min(), x.max(), x, cell) for ring_corners in corners[1:] for x in ring_corners.T
     ]
     return pad_rows(lines), pad_rows(
-        [sorted(set(x)) for ring_corners in np.round(corners, 3) for x in ring_corners.T.tolist()]
+        [sorted(set(x)) for ring_corners in corners for x in ring_corners.T.tolist()]
     )
 
 

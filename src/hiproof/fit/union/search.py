@@ -1,7 +1,6 @@
 """Search the volumes of a plan.
 
-Structure is searched with some of the points, simplified as a draughtsman would, and settled on all
-of them.
+Structure is searched with some of the points, and settled on all of them.
 """
 
 from __future__ import annotations

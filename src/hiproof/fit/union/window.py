@@ -66,11 +66,7 @@ def open_window(whole: Whole, box: Box, most_points: int) -> Scene | None:
         corner_v=corner[1],
         lines=pad_rows(lines),
         vertices=pad_rows(
-            [
-                sorted(set(x))
-                for ring_corners in np.round(corners, 3)
-                for x in ring_corners.T.tolist()
-            ]
+            [sorted(set(x)) for ring_corners in corners for x in ring_corners.T.tolist()]
         ),
         corners=corners,
         leans=pad_rows(
