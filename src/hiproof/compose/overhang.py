@@ -15,6 +15,7 @@ import numpy as np
 import shapely
 
 from ..errors import CompositionError
+from ..geometry.rings import list_between
 from ..model import CEILING, ROOF, WALL, Passage, Solid, Underside
 from .arrangement import COLLINEAR_UNITS, GRID_M
 from .building_parts import list_edges
@@ -295,16 +296,9 @@ def weld_edges(ring: np.ndarray, corners: np.ndarray) -> np.ndarray:
     """Return a ring (k, 2) that passes through the `corners` (n, 2) beside its edges."""
     result = []
     for start, end in itertools.pairwise([*ring, ring[0]]):
-        along = end - start
-        length = float(np.hypot(*along))
-        if length == 0.0:
-            continue
-        offset = corners - start
-        t = offset @ along / length
-        aside = np.abs(offset @ [-along[1], along[0]]) / length
-        is_near = (t > SAME_PLACE_UNITS) & (t < length - SAME_PLACE_UNITS)
-        is_near &= aside <= SAME_PLACE_UNITS
-        result += [start, *corners[is_near][np.argsort(t[is_near])]]
+        if (start != end).any():
+            inner = list_between(start, end, corners, SAME_PLACE_UNITS)
+            result += [start, *corners[inner]]
     return np.array(result)
 
 

@@ -21,7 +21,7 @@ import numpy as np
 import shapely
 
 from ..errors import CompositionError
-from ..geometry.rings import with_area
+from ..geometry.rings import list_between, with_area
 from ..model import CEILING, GROUND, ROOF, WALL, Face, Model, Passage, Solid, Underside
 from ..settings import ComposeSettings
 from .arrangement import GRID_M
@@ -181,14 +181,8 @@ class Shell:
 
     def find_on_edge(self, start: Place, end: Place) -> list[Place]:
         """Return the places between the ends of an edge that lie on it, in its order."""
-        along = np.subtract(end, start)
-        length = float(np.hypot(*along))
-        offset = self.pool - start
-        t = offset @ along / length
-        aside = np.abs(offset @ [-along[1], along[0]]) / length
-        reach = self.on_edge_units
-        inner = (t > reach) & (t < length - reach) & (aside <= reach)
-        return [(x, y) for x, y in self.pool[inner][np.argsort(t[inner])].tolist()]
+        inner = list_between(start, end, self.pool, self.on_edge_units)
+        return [(x, y) for x, y in self.pool[inner].tolist()]
 
     def measure_ground(self, cap: Cap) -> dict[Place, int]:
         """Return the height of the ground at every place of a cell."""

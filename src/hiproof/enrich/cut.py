@@ -13,7 +13,7 @@ import numpy as np
 import shapely
 
 from ..compose import check_solid
-from ..geometry.rings import with_area
+from ..geometry.rings import list_between, with_area
 from ..model import Face, Solid
 from .walls import Wall
 
@@ -154,19 +154,7 @@ def insert_corners(face: Face, vertices: np.ndarray, added: range) -> Face:
         others = np.array([n for n in added if n not in ring], int)
         corners: list[int] = []
         for start, end in zip(ring, (*ring[1:], ring[0]), strict=True):
-            corners += [start, *find_on_edge(vertices, start, end, others)]
+            inner = list_between(vertices[start], vertices[end], vertices[others], SAME_CORNER_M)
+            corners += [start, *others[inner].tolist()]
         rings.append(tuple(corners))
     return Face(tuple(rings), face.kind, face.part)
-
-
-def find_on_edge(vertices: np.ndarray, start: int, end: int, others: np.ndarray) -> list[int]:
-    """Return those of `others` that lie on an edge, in its order."""
-    along = vertices[end] - vertices[start]
-    length = float(np.linalg.norm(along))
-    if not len(others) or length <= 2 * SAME_CORNER_M:
-        return []
-    place = vertices[others] - vertices[start]
-    t = place @ along / length
-    aside = np.linalg.norm(place - np.outer(t / length, along), axis=1)
-    on_edge = (aside <= SAME_CORNER_M) & (t > SAME_CORNER_M) & (t < length - SAME_CORNER_M)
-    return others[on_edge][np.argsort(t[on_edge])].tolist()

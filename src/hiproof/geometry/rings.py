@@ -72,6 +72,30 @@ def with_area(geometry: shapely.Geometry) -> shapely.Geometry:
     return polygons[0] if len(polygons) == 1 else shapely.MultiPolygon(polygons)
 
 
+def list_between(
+    start: Sequence[float] | np.ndarray,
+    end: Sequence[float] | np.ndarray,
+    places: np.ndarray,
+    reach: float,
+) -> np.ndarray:
+    """Return which of `places` (n, d) lie on an edge, in its order.
+
+    They are within `reach` of it, and farther from its ends.
+
+    >>> places = np.array([[3.0, 0.0], [1.0, 0.0], [2.0, 1.0], [0.0, 0.0]])
+    >>> list_between(np.zeros(2), np.array([4.0, 0.0]), places, 0.1).tolist()
+    [1, 0]
+    """
+    along, offset = np.subtract(end, start), places - start
+    length = float(np.linalg.norm(along))
+    if length <= 2.0 * reach:
+        return np.empty(0, int)
+    t = offset @ along / length
+    aside = np.linalg.norm(offset - np.outer(t / length, along), axis=1)
+    is_on = (t > reach) & (t < length - reach) & (aside <= reach)
+    return np.flatnonzero(is_on)[np.argsort(t[is_on])]
+
+
 def ring_normal(ring: np.ndarray) -> np.ndarray:
     """Return the vector area (3,) of a closed ring (m, 3), by Newell's method.
 

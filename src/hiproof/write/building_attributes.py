@@ -162,13 +162,17 @@ def building_attributes(
     return input_attributes | {name: plain(value) for name, value in computed.items()}
 
 
+ROOF_HEIGHTS = ("min", "50p", "70p", "max", "ridge")
+QUALITY_FIGURES = (
+    *("psd_mean", "psd_std", "p95", "share_within_20cm", "outline_iou", "unexplained_area_m2"),
+)
+
+
 def roofer_attributes(building: Building, figures: RoofFigures | None) -> dict[str, Any]:
     """Return the attributes that users of roofer and 3DBAG expect, unprefixed."""
     quality = building.quality
     if figures is None:
-        shape = dict.fromkeys(
-            ("h_roof_min", "h_roof_50p", "h_roof_70p", "h_roof_max", "h_roof_ridge", "volume_lod22")
-        )
+        shape = dict.fromkeys((*(f"h_roof_{name}" for name in ROOF_HEIGHTS), "volume_lod22"))
         roof_type, mode = "no points" if building.status is Status.NO_POINTS else "unknown", "skip"
     else:
         shape = shape_attributes(figures)
@@ -191,14 +195,8 @@ def roofer_attributes(building: Building, figures: RoofFigures | None) -> dict[s
 
 def shape_attributes(figures: RoofFigures) -> dict[str, Any]:
     """Return heights and volume, without prefix."""
-    return {
-        "h_roof_min": metres(figures.h_min),
-        "h_roof_50p": metres(figures.h_50p),
-        "h_roof_70p": metres(figures.h_70p),
-        "h_roof_max": metres(figures.h_max),
-        "h_roof_ridge": metres(figures.h_ridge),
-        "volume_lod22": round_value(figures.volume_m3, 4),
-    }
+    heights = {f"h_roof_{name}": metres(getattr(figures, f"h_{name}")) for name in ROOF_HEIGHTS}
+    return {**heights, "volume_lod22": round_value(figures.volume_m3, 4)}
 
 
 def hiproof_attributes(
@@ -221,12 +219,7 @@ def hiproof_attributes(
         "h_eave": None if figures is None else metres(figures.h_eave),
         "parts": len(building.parts),
         "points": int(quality.points),
-        "psd_mean": round_value(quality.psd_mean),
-        "psd_std": round_value(quality.psd_std),
-        "p95": round_value(quality.p95),
-        "share_within_20cm": round_value(quality.share_within_20cm),
-        "outline_iou": round_value(quality.outline_iou),
-        "unexplained_area_m2": round_value(quality.unexplained_area_m2),
+        **{name: round_value(getattr(quality, name)) for name in QUALITY_FIGURES},
         "ground_source": building.ground_source or None,
         **ground_attributes(building),
         "shift_x": round_value(building.shift[0]),

@@ -172,6 +172,27 @@ def scratch(path: str | os.PathLike) -> Iterator[BinaryIO]:
 
 
 @contextmanager
+def whole_folder(folder: Path) -> Iterator[Path]:
+    """Yield a hidden folder that takes the place of `folder`.
+
+    It does so when the block ends well, and is removed when not.
+    """
+    name = hidden_name(folder)
+    older = name.with_name(name.name + "-older")
+    try:
+        name.mkdir(parents=True)
+        yield name
+        if folder.exists():
+            folder.rename(older)
+        name.rename(folder)
+    except OSError as error:
+        raise output_error(folder, error) from error
+    finally:
+        for remainder in (name, older):
+            remove(remainder)
+
+
+@contextmanager
 def open_hidden(hidden: Path, path: Path) -> Iterator[BinaryIO]:
     """Yield a buffered file at `hidden`, whose errors speak of `path`."""
     try:

@@ -45,7 +45,7 @@ def remove_bundles(out: Path, failed_ids: Collection[str] = ()) -> None:
     for bundle in bundles_in(out):
         if bundle.name not in selection:
             shutil.rmtree(bundle, ignore_errors=True)
-    for unfinished in folder.glob(".bundle-*"):
+    for unfinished in folder.glob(".*"):
         shutil.rmtree(unfinished, ignore_errors=True)
     with suppress(OSError):  # it is not there, or holds something
         folder.rmdir()

@@ -19,11 +19,8 @@ A run keeps at most 20. They go when the buildings are solved, or when the run b
 from __future__ import annotations
 
 import json
-import os
-import secrets
 import shutil
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +35,7 @@ from ...model import Footprint
 from ...parametric.override import NOTE_KEYS, Override, read_override
 from ...read.points.las import translate_errors
 from ...settings import Settings
+from ...write.files import whole_folder
 from ..plan.overrides import OVERRIDES_FILE
 from ..plan.work_plan import Job, WorkPlan, neighbourhood
 from .bundle_folders import FACTS, FAILURES_FOLDER, bundles_in, folder_name
@@ -168,19 +166,6 @@ def save_bundle(
         (temporary / FACTS).write_text(
             json.dumps(masked_values(facts), indent=1) + "\n", encoding="utf-8"
         )
-
-
-@contextmanager
-def whole_folder(folder: Path) -> Iterator[Path]:
-    """Yield a hidden folder that becomes `folder` when the block ends well."""
-    sibling_path = folder.with_name(f".bundle-{os.getpid()}-{secrets.token_hex(4)}")
-    sibling_path.mkdir(parents=True)
-    try:
-        yield sibling_path
-        shutil.rmtree(folder, ignore_errors=True)
-        sibling_path.rename(folder)
-    finally:
-        shutil.rmtree(sibling_path, ignore_errors=True)
 
 
 def crop_points(points: dict[str, np.ndarray], plan: WorkPlan, job: Job) -> dict[str, np.ndarray]:

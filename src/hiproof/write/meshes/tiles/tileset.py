@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import json
 import warnings
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -20,7 +19,7 @@ import numpy as np
 
 from .... import __version__
 from ....errors import InputError, InputWarning, OutputError
-from ...files import hidden_name, output_error, remove, scratch
+from ...files import output_error, scratch, whole_folder
 from ..viewed import ViewedModel, merge_values
 from .content import TileMesh, make_mesh, tile_glb
 from .globe import Globe, make_local_frame
@@ -219,27 +218,6 @@ def make_room(folder: Path) -> None:
             f"expected a new folder or one with a tileset for the tiles, got {folder}; choose "
             "another name"
         )
-
-
-@contextmanager
-def whole_folder(folder: Path) -> Iterator[Path]:
-    """Yield a hidden folder that takes the place of `folder`.
-
-    It does so when the block ends well, and is removed when not.
-    """
-    name = hidden_name(folder)
-    older = name.with_name(name.name + "-older")
-    try:
-        name.mkdir()
-        yield name
-        if folder.exists():
-            folder.rename(older)
-        name.rename(folder)
-    except OSError as error:
-        raise output_error(folder, error) from error
-    finally:
-        for remainder in (name, older):
-            remove(remainder)
 
 
 @dataclass(frozen=True)
