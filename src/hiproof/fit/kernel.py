@@ -574,12 +574,12 @@ def sharpen_sides(problem, tables, kind, theta, lower, upper, noise, prior, taus
 
 
 @compiled
-def tabulate_sides(problem, tables, kind, theta, noise, shifts, space):
+def tabulate_sides(problem, tables, kind, theta, noise, shifts):
     """Return log likelihood ratios (4, k) of moving each side outward.
 
     Sides are +u, -u, +v and -v; `shifts` (2, k) are along u and along v.
     """
-    points, planes = problem.points, space.planes
+    points, planes = problem.points, new_space().planes
     planes_from_terms(tables, kind, theta, planes)
     ends, strips = tables.ends[kind], tables.strips[kind]
     c, s = math.cos(theta[KAPPA]), math.sin(theta[KAPPA])
@@ -613,37 +613,6 @@ def tabulate_sides(problem, tables, kind, theta, noise, shifts, space):
 
 
 @compiled
-def side_posterior(plus, minus, shifts, half_extent, inliers, centre_precision):
-    """Return the posterior of an axis on the grid of `shifts`.
-
-    It has the mean shift of the centre, of the half extent, and their variances.
-
-    `plus` and `minus` (k,) are the sides' log likelihood ratios; the heights hold the centre with
-    `centre_precision`.
-    """
-    count = len(shifts)
-    logs, top = np.empty((count, count)), -np.inf
-    for a in range(count):
-        for b in range(count):
-            centre, growth = 0.5 * (shifts[a] - shifts[b]), 0.5 * (shifts[a] + shifts[b])
-            logs[a, b] = plus[a] + minus[b] - inliers * math.log(1.0 + growth / half_extent)
-            logs[a, b] -= 0.5 * centre_precision * centre * centre
-            top = max(top, logs[a, b])
-    total = centre_sum = growth_sum = centre_squares = growth_squares = 0.0
-    for a in range(count):
-        for b in range(count):
-            w = math.exp(logs[a, b] - top)
-            centre, growth = 0.5 * (shifts[a] - shifts[b]), 0.5 * (shifts[a] + shifts[b])
-            total += w
-            centre_sum += w * centre
-            growth_sum += w * growth
-            centre_squares += w * centre * centre
-            growth_squares += w * growth * growth
-    centre, growth = centre_sum / total, growth_sum / total
-    return centre, growth, centre_squares / total - centre**2, growth_squares / total - growth**2
-
-
-@compiled
 def height_hessian(problem, tables, kind, theta, noise):
     """Return the Hessian (9, 9) of the heights and the sum of inliers.
 
@@ -659,34 +628,6 @@ def height_hessian(problem, tables, kind, theta, noise):
         for b in range(a):
             hessian[b, a] = hessian[a, b]
     return hessian, inliers
-
-
-@compiled
-def mean_sides(problem, tables, kind, theta, noise, centre_precision, inliers, grid):
-    """Move `theta` to the posterior means of its four sides, heights held; in place.
-
-    `centre_precision` (2,) along u and v. Returns the variances (4,) of centre u, centre v, V, U.
-    """
-    shifts = np.empty((2, grid))
-    for axis in range(2):
-        gap = 2.0 * theta[HALF_LENGTH - axis] / max(inliers, 1.0)
-        lower, upper = -(2.0 * noise.tau + 1.5 * gap), 2.0 * noise.tau + 7.0 * gap
-        lower = max(lower, -0.5 * theta[HALF_LENGTH - axis])
-        for k in range(grid):
-            shifts[axis, k] = lower + (upper - lower) * k / (grid - 1)
-    table = tabulate_sides(problem, tables, kind, theta, noise, shifts, new_space())
-    centre_u, growth_u, var_u, var_length = side_posterior(
-        table[0], table[1], shifts[0], theta[HALF_LENGTH], inliers, centre_precision[0]
-    )
-    centre_v, growth_v, var_v, var_width = side_posterior(
-        table[2], table[3], shifts[1], theta[HALF_WIDTH], inliers, centre_precision[1]
-    )
-    c, s = math.cos(theta[KAPPA]), math.sin(theta[KAPPA])
-    theta[CENTRE_X] += c * centre_u - s * centre_v
-    theta[CENTRE_Y] += s * centre_u + c * centre_v
-    theta[HALF_LENGTH] += growth_u
-    theta[HALF_WIDTH] += growth_v
-    return np.array([var_u, var_v, var_width, var_length])
 
 
 @compiled

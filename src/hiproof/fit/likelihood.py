@@ -530,15 +530,43 @@ def settle_sides(search, kind, theta, lower, upper, noise) -> tuple[np.ndarray, 
     turned[:2, :2] = [[c, -s], [s, c]]
     information = (turned.T @ hessian @ turned)[np.ix_(free, free)] + 1e-4 * np.eye(len(free))
     centre_precision = 1 / np.diag(np.linalg.inv(information))[:2]
-    variances = kernel.mean_sides(
-        search.whole, search.tables, kind, theta, noise, centre_precision, inliers, SIDE_GRID
-    )
+    variances = average_sides(search, kind, theta, noise, centre_precision, inliers)
     lower, upper = lower.copy(), upper.copy()
     lower[PLAN_INDICES] = upper[PLAN_INDICES] = theta[PLAN_INDICES]
     _, _, _, evaluations = kernel.minimise(
         search.whole, search.tables, kind, theta, lower, upper, noise, 4, 1e-3
     )
     return variances, evaluations
+
+
+def average_sides(search, kind, theta, noise, centre_precision, inliers) -> np.ndarray:
+    """Move `theta` to the posterior means of its four sides, heights held; in place.
+
+    `centre_precision` (2,) is along u and v. Returns the variances (4,) of the centre along u and
+    v, and of V and U.
+    """
+    halves, growths = theta[[HALF_LENGTH, HALF_WIDTH]], np.linspace(0.0, 1.0, SIDE_GRID)
+    gaps = 2.0 * halves / max(inliers, 1.0)
+    lower = np.maximum(-(2.0 * noise.tau + 1.5 * gaps), -0.5 * halves)
+    shifts = lower[:, None] + (2.0 * noise.tau + 7.0 * gaps - lower)[:, None] * growths
+    table = kernel.tabulate_sides(search.whole, search.tables, kind, theta, noise, shifts)
+    # over axes, shifts of the side ahead and shifts of the side behind
+    centre = 0.5 * (shifts[:, :, None] - shifts[:, None])
+    growth = 0.5 * (shifts[:, :, None] + shifts[:, None])
+    logs = table[::2, :, None] + table[1::2, None]
+    logs -= inliers * np.log(1.0 + growth / halves[:, None, None])
+    logs -= 0.5 * centre_precision[:, None, None] * centre**2
+    weights = np.exp(logs - logs.max(axis=(1, 2), keepdims=True))
+    weights /= weights.sum(axis=(1, 2), keepdims=True)
+    means, squares = (
+        np.array([(weights * one**power).sum(axis=(1, 2)) for one in (centre, growth)])
+        for power in (1, 2)
+    )
+    c, s = np.cos(theta[KAPPA]), np.sin(theta[KAPPA])
+    theta[:2] += np.array([[c, -s], [s, c]]) @ means[0]
+    theta[[HALF_LENGTH, HALF_WIDTH]] += means[1]
+    (centre_u, centre_v), (length, width) = squares - means**2
+    return np.array([centre_u, centre_v, width, length])
 
 
 def estimate_covariance(
