@@ -28,7 +28,10 @@ def list_places(
     out of it on both sides. Level volumes at one height that touch are one part, of the largest.
     The last value says whether a part has other ends than its volume.
     """
-    regions, visible = draw_regions(roof, outline), draw_visible(drawing)
+    regions = draw_regions(roof, outline)
+    if len(regions) == 1:
+        return [(0, regions[0], len(regions[0]) > 1)]
+    visible = draw_visible(drawing)
     groups: dict[tuple, dict[int, list[int]]] = {}
     first = join_fragments(roof, drawing)
     for f in range(drawing.count[0]):

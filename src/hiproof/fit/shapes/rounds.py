@@ -88,9 +88,11 @@ def list_top_shapes(
 ) -> Iterator[tuple[Part, int]]:
     """Yield round shapes around the top of a part, which is seen at the points `own` (k,)."""
     start, wide = roof.points[own, :2].mean(axis=0), math.sqrt(part.area / math.pi)
+    disc = own[:0]
     for radius in (share * wide for share in RADII):
+        last = disc
         centre, disc = find_centre(roof, start, radius)
-        if not roof.is_worth(disc, 0.0, CIRCLE_NUMBERS):
+        if np.array_equal(disc, last) or not roof.is_worth(disc, 0.0, CIRCLE_NUMBERS):
             continue
         misfit = roof.price_gaps(measure_round_gaps(roof.points[disc], centre)).sum()
         # The facets of a spire are named so, and lie as near. A house may have one cant.
