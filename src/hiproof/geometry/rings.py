@@ -8,8 +8,6 @@ from typing import Any
 import numpy as np
 import shapely
 
-from .flat_shell import FlatShell
-
 # of coordinates (m) where polygons are overlaid: on a grid no overlay fails, nor loses a polygon
 # whose sides all but lie on a neighbour's, as GEOS 3.14 does without one
 OVERLAY_GRID_M = 1e-6
@@ -106,5 +104,14 @@ def ring_normal(ring: np.ndarray) -> np.ndarray:
 
 def ring_normals(rings: Sequence[np.ndarray]) -> np.ndarray:
     """Return the vector areas (n, 3) of n rings, each as from `ring_normal`."""
-    starts = np.cumsum([0, *map(len, rings)])
-    return FlatShell(np.concatenate(rings), np.arange(starts[-1]), starts, starts[:0]).areas
+    sizes = np.array([len(ring) for ring in rings])
+    first = np.cumsum(sizes) - sizes
+    following = np.arange(1, sizes.sum() + 1)
+    following[first + sizes - 1] = first
+    vertices = np.concatenate(rings)
+    centre = np.add.reduceat(vertices, first) / sizes[:, None]
+    x, y, z = (vertices - np.repeat(centre, sizes, axis=0)).T
+    u, v, w = x[following], y[following], z[following]
+    return (
+        np.add.reduceat(np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=1), first) / 2
+    )
