@@ -112,7 +112,6 @@ def make_scene(
         shapely.get_coordinates(outline.exterior)[:-1] - plan.frame.origin[:2]
     ) @ plan.frame.rotation.T
     corners = np.array([ring @ np.array([[c, -s], [s, c]]) for c, s in turn])
-    lines, vertices = make_lines(plan, corners)
     U, V = np.array([c * u + s * v for c, s in turn]), np.array([c * v - s * u for c, s in turn])
     return Scene(
         U,
@@ -129,10 +128,10 @@ def make_scene(
         float(corner[0]),
         float(corner[1]),
         pitch,
-        lines,
-        vertices,
+        make_lines(plan, corners),
+        list_vertices(corners),
         corners,
-        pad_rows([find_leans(ring_corners, axis) for ring_corners in corners for axis in (0, 1)]),
+        list_leans(corners),
         evidence,
         DEAD_M,
         max(tolerance_m - DEAD_M, LEAST_RAMP_M),
@@ -212,19 +211,27 @@ def place_nodes(scene: Scene, least_depth: float) -> tuple[np.ndarray, np.ndarra
     return scene.corner_u + i * scene.pitch, scene.corner_v + j * scene.pitch
 
 
-def make_lines(plan: Plan, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return grid lines and vertex lines (directions, 2, m) of an outline.
+def make_lines(plan: Plan, corners: np.ndarray) -> np.ndarray:
+    """Return grid lines (directions, 2, m) of an outline, ascending, padded with infinity.
 
-    Its `corners` are (directions, c, 2). Lines ascend, padded with infinity.
+    Its `corners` are (directions, c, 2).
     """
     cell = median(np.diff(plan.grid.u).tolist())
     lines = [plan.grid.u, plan.grid.v]
     lines += [
         lay_lines(x.min(), x.max(), x, cell) for ring_corners in corners[1:] for x in ring_corners.T
     ]
-    return pad_rows(lines), pad_rows(
-        [sorted(set(x)) for ring_corners in corners for x in ring_corners.T.tolist()]
-    )
+    return pad_rows(lines)
+
+
+def list_vertices(corners: np.ndarray) -> np.ndarray:
+    """Return the lines (directions, 2, m) through corners, ascending, padded with infinity."""
+    return pad_rows([sorted(set(x)) for ring_corners in corners for x in ring_corners.T.tolist()])
+
+
+def list_leans(corners: np.ndarray) -> np.ndarray:
+    """Return the leans (directions, 2, m) of walls between corners, padded with infinity."""
+    return pad_rows([find_leans(ring_corners, axis) for ring_corners in corners for axis in (0, 1)])
 
 
 def find_leans(ring: np.ndarray, axis: int) -> list[float]:

@@ -14,7 +14,7 @@ import shapely
 from ..shapes.regions import list_polygons
 from . import plan as plans
 from .planes import Cloud, Grid
-from .scene import Scene, find_leans, pad_rows, sort_along
+from .scene import Scene, list_leans, list_vertices, pad_rows, sort_along
 from .volumes import DIRECTION, U0
 from .whole import Box, Whole, clip_to_box
 
@@ -65,13 +65,9 @@ def open_window(whole: Whole, box: Box, most_points: int) -> Scene | None:
         corner_u=corner[0],
         corner_v=corner[1],
         lines=pad_rows(lines),
-        vertices=pad_rows(
-            [sorted(set(x)) for ring_corners in corners for x in ring_corners.T.tolist()]
-        ),
+        vertices=list_vertices(corners),
         corners=corners,
-        leans=pad_rows(
-            [find_leans(ring_corners, axis) for ring_corners in corners for axis in (0, 1)]
-        ),
+        leans=list_leans(corners),
         evidence=share * scene.evidence,
     )
 
