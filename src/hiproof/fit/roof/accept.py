@@ -29,7 +29,6 @@ from .price import (
 from .tables import VOLUME_COUNT, copy_tables, has_room, pack, place_planes
 
 CHANGE_MARGIN_M = 0.5  # Distance (m) beyond what a move touches in which corners may change.
-BOX_STEP_M = 0.5  # Boxes end at multiples of this (m), so that many moves have one box.
 FIT_ROUNDS = 2  # Rounds of fitting and choosing points again.
 LEAST_UNITS = 0.05  # What a move must save: fitting again alone saves less.
 HOPE_UNITS = 2.0  # What fitting may still save of a move that does not pay before it.
@@ -53,12 +52,8 @@ def measure_change(roof, trial, changed, site, box):
             widen_box(box, trial.boxes[k])
     for axis in range(2):
         low, high = 2 * axis, 2 * axis + 1
-        least = max(box[low], site.bounds[low]) - CHANGE_MARGIN_M
-        most = min(box[high], site.bounds[high]) + CHANGE_MARGIN_M
-        box[low], box[high] = (
-            np.floor(least / BOX_STEP_M) * BOX_STEP_M,
-            np.ceil(most / BOX_STEP_M) * BOX_STEP_M,
-        )
+        box[low] = max(box[low], site.bounds[low]) - CHANGE_MARGIN_M
+        box[high] = min(box[high], site.bounds[high]) + CHANGE_MARGIN_M
 
 
 @compiled
