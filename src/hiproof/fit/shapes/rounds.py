@@ -18,7 +18,6 @@ from ...primitives.catalogue import CATALOGUE
 from ...primitives.cone import BROACH_SIDES, HEXAGON_SIDES
 from ...primitives.contract import CX, CY, HALF_LENGTH, HALF_WIDTH, KAPPA, Q0, Q1, Primitive
 from ...primitives.facets import find_apothem
-from ..regular import approach, find_covariance, list_heights
 from .accept import PartsRoof
 from .arcs import APSE_DEG, TURRET_DEG, Arc, cut_to_outline
 from .regions import cut_part, list_polygons
@@ -167,18 +166,15 @@ def fit_followers(
     """
     from ..likelihood import fit_heights  # compiled code that most roofs never need
 
-    plan = (*free, HALF_LENGTH) if HALF_WIDTH in free else free
-    free, spacing = (*free, *list_heights(shape)), 0.0
+    numbers, spacing = len(free) + shape.theta_size - Q0, 0.0
     inside = points[shapely.contains_xy(shape.part(theta).pieces[0].outline, *points[:, :2].T)]
-    turns = np.arange(TURNS_TRIED if KAPPA in plan else 1) * 2.0 * math.pi / len(shape.rim)
+    turns = np.arange(TURNS_TRIED if KAPPA in free else 1) * 2.0 * math.pi / len(shape.rim)
     theta = find_start(inside, shape, theta, turns / TURNS_TRIED)
     for _ in range(GROWTH_ROUNDS):
         near = inside[follow(inside, shape, theta, 3.0)]
-        if len(near) < max(FEWEST_POINTS, 2 * len(free)):
+        if len(near) < max(FEWEST_POINTS, 2 * numbers):
             return None
-        theta, _ = fit_heights(np.column_stack([near, np.ones(len(near))]), shape, theta, plan)
-        if HALF_WIDTH in free:
-            theta[[HALF_WIDTH, HALF_LENGTH]] = theta[[HALF_WIDTH, HALF_LENGTH]].mean()
+        theta, _ = fit_heights(weigh(near), shape, theta, free)
         if grows:
             r = np.hypot(*(points[:, :2] - theta[:2]).T)
             order = np.argsort(r, kind="stable")
@@ -188,9 +184,14 @@ def fit_followers(
             inside = points[order[: last + 1]]
             spacing = r[order[last]] / math.sqrt(last + 1.0)
     if shape.minima:  # Points on a steep needle lie far off in height.
-        theta = approach(inside, shape.variant(shape.from_theta(theta)[0]), theta, free)[1]
+        theta, _ = fit_heights(weigh(inside), shape, theta, free)
     part = make_part(inside, shape, theta, free, spacing**2)
     return part if is_top_seen(part, inside) else None
+
+
+def weigh(points: np.ndarray) -> np.ndarray:
+    """Return points (n, 4), each of which counts once."""
+    return np.column_stack([points, np.ones(len(points))])
 
 
 def follow(
@@ -248,8 +249,9 @@ def make_part(
 
     Its standard deviations follow from these, and from the variance (m2) of half its width.
     """
-    from ..single import find_deviations  # compiled code that most roofs never need
+    from ..likelihood import find_covariance  # compiled code that most roofs never need
+    from ..single import find_deviations
 
     variant = shape.variant(shape.from_theta(theta)[0])
-    covariance = find_covariance(points, variant, theta, free, width_variance)
+    covariance = find_covariance(weigh(points), shape, theta, free, width_variance)
     return variant.part(theta, find_deviations(variant, theta, covariance))
