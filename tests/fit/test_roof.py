@@ -5,7 +5,7 @@ import pytest
 import shapely
 
 from hiproof.fit.prices import compute_unit
-from hiproof.fit.roof import fit_building, improve_all, start_roof
+from hiproof.fit.roof import fit_building, improve_all, read_parts, start_roof
 from hiproof.fit.roof.accept import fit_roof, try_move
 from hiproof.fit.roof.draw import (
     compute_height,
@@ -149,6 +149,25 @@ def test_packing_changes_no_plane(kind):
     copy_tables(roof, copy)
     pack(copy)
     assert price(copy, site) == pytest.approx(price(roof, site))
+
+
+@pytest.mark.parametrize("kind", COMPOUND_KINDS)
+def test_a_slope_below_zero_names_the_parts_that_the_same_planes_have_otherwise(kind):
+    """A plane that falls to the other side faced the wrong way, and its house was simplified."""
+    roof, site, outline, _ = begin_roof(kind)
+    plan = lay_out_plan(*scan_compound(kind))
+    improve_all(roof, make_tables_like(roof), site, make_drawing(len(roof.sides)))
+    parts = read_parts(roof, site, outline, plan, ())
+    slopes = roof.slopes[roof.slopes >= 0]
+    roof.values[np.unique(slopes)] *= -1.0
+    roof.plane_lines[roof.slopes >= 0] *= -1
+    for k in range(roof.counts[VOLUME_COUNT]):
+        place_volume(roof, k)
+    turned = read_parts(roof, site, outline, plan, ())
+    assert [part.type for part in turned] == [part.type for part in parts]
+    for one, other in zip(turned, parts, strict=True):
+        xy = shapely.get_coordinates([p.representative_point() for p in other.outlines])
+        assert one.height_at(xy) == pytest.approx(other.height_at(xy), abs=1e-6)
 
 
 def test_a_polygon_is_split_into_convex_parts_that_cover_it():

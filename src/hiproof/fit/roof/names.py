@@ -37,14 +37,15 @@ def read_planes(roof: Tables, k: int, axes: np.ndarray, covariance: np.ndarray) 
     for p in range(roof.n_planes[k]):
         a, b, c = read_line(roof, roof.plane_lines[k, p])
         u, v = (x if abs(x) > STRAIGHT else 0.0 for x in (axes @ [a, b]).tolist())
-        place, cosine = (LEVEL, 1.0) if roof.slopes[k, p] < 0 else find_place(u, v)
+        slope = roof.values[roof.slopes[k, p]] if roof.slopes[k, p] >= 0 else 0.0
+        way = math.copysign(1.0, slope)  # a plane faces the side that it falls to
+        place, cosine = (LEVEL, 1.0) if roof.slopes[k, p] < 0 else find_place(way * u, way * v)
         if cosine <= FACED or np.isfinite(rows[place, 2]):
-            walls.append(OutlineWall(math.atan2(-v, -u), c))
+            walls.append(OutlineWall(math.atan2(-way * v, -way * u), way * c))
             rows, design = (
                 np.concatenate([x, np.zeros((1, *x.shape[1:]))]) for x in (rows, design)
             )
             place = len(rows) - 1
-        slope = roof.values[roof.slopes[k, p]] if roof.slopes[k, p] >= 0 else 0.0
         rows[place] = [slope * u, slope * v, roof.planes[k, p, 2]]
         design[place, 2, roof.heights[k, p]] = 1.0
         if roof.slopes[k, p] >= 0:
