@@ -25,7 +25,6 @@ from hiproof.fit.union.moves import (
     find_best_plane,
     place_outside,
     refit_volumes,
-    settle_volume,
 )
 from hiproof.fit.union.objective import (
     BASE_SHARE,
@@ -440,9 +439,6 @@ def test_moved_edges_leave_a_rectangle(seed):
 
 
 MOVES = {
-    "settle": lambda volumes, scene, value: settle_volume(
-        volumes, scene, value, len(volumes) - 1, 60.0
-    ),
     "refit": refit_volumes,
     "improve": lambda volumes, scene, value: improve(volumes, scene, value, SLOPES, 2),
 }

@@ -28,10 +28,6 @@ from .volumes import (
 )
 
 MIN_SIDE_M = 0.8  # A narrower volume (m) is no part of a roof but a gutter or a parapet.
-SETTLE_REACH_M = 0.7  # Distance (m) that edges may move when more points settle them.
-# Distance (m) that an edge may move to a place midway between points when it is settled. In the
-# search, an edge should stay on a line.
-BETWEEN_M = 0.4
 BEYOND_OUTLINE_M = 0.6  # An edge so far (m) outside the outline is not visible.
 VERTEX_REACH_M = 1.5  # Corners of the outline within this distance (m) are places for an edge.
 SMALL_STEPS = 4  # Steps tried to either side of an edge.
@@ -79,13 +75,10 @@ def move_edges(volumes, scene, k, value, reach, context):
         sign = -1.0 if edge % 2 == 0 else 1.0
         count = sum_outward(volumes, scene, k, edge, gain, bare, sums)
         distance, gains, covered = sums[0, :count], sums[1, :count], sums[2, :count]
-        places[m] = (
-            find_place_between(distance, gains, sign, start) if reach <= SETTLE_REACH_M else start
-        )
         best, best_place = value - NO_GAIN, start
         # The bounds are the cost of the roof at each place before its edges are charged.
-        bounds = np.full(m + 1, np.inf)
-        for q in range(m + 1):
+        bounds = np.full(m, np.inf)
+        for q in range(m):
             t = places[q]
             if abs(t - start) > reach or sign * (t - opposite) < MIN_SIDE_M:
                 continue
@@ -159,28 +152,9 @@ def sum_outward(volumes, scene, k, edge, gain, bare, sums):
 
 
 @compiled
-def find_place_between(distance, gains, sign, start):
-    """Return the place near `start`, midway between two points, of the lowest misfit.
-
-    `distance` (m,) are the points' distances along the edge's way out, ascending, and `gains` (m,)
-    is the misfit up to each of them.
-    """
-    first = find_place(distance, sign * start - BETWEEN_M)
-    last = find_place(distance, sign * start + BETWEEN_M)
-    lowest, place = np.inf, start
-    for p in range(max(first, 1), min(last, len(distance) - 1) + 1):
-        if gains[p - 1] < lowest:
-            lowest, place = gains[p - 1], sign * 0.5 * (distance[p - 1] + distance[p])
-    return place
-
-
-@compiled
 def count_most_places(scene, count):
-    """Count the places of an edge of one of `count` volumes at most.
-
-    One more is for the caller.
-    """
-    return scene.lines.shape[2] + scene.vertices.shape[2] + 2 * SMALL_STEPS + 3 * count + 2
+    """Count the places of an edge of one of `count` volumes at most."""
+    return scene.lines.shape[2] + scene.vertices.shape[2] + 2 * SMALL_STEPS + 3 * count + 1
 
 
 @compiled

@@ -11,8 +11,8 @@ import shapely
 from .blocks import BLOCK_M2, HeightRaster, find_cheapest_cut
 from .candidates import Effort
 from .grow import grow
-from .moves import settle_volumes
-from .objective import BASE_SHARE
+from .moves import refit_volumes
+from .objective import BASE_SHARE, compute_objective
 from .plan import Plan
 from .scene import Scene
 from .trim import trim
@@ -100,7 +100,9 @@ def search_block(whole: Whole, box: Box) -> tuple[np.ndarray, Scene] | None:
     scene, settling = open_window(whole, box, BLOCK_POINTS), open_window(whole, box, SETTLE_POINTS)
     if scene is None or settling is None:
         return None
-    volumes, value = settle_volumes(grow(scene, BLOCK)[0], settling)
+    volumes = grow(scene, BLOCK)[0]
+    value = compute_objective(volumes, settling, np.inf)
+    volumes, value = refit_volumes(volumes, settling, value)
     return trim(volumes, settling, value)[0], settling
 
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from ...compiled import compiled
 from .around import compute_roof_everywhere, compute_roof_with, measure_context
-from .edges import BEYOND_OUTLINE_M, EVERYWHERE, NO_GAIN, SETTLE_REACH_M, move_edges
+from .edges import BEYOND_OUTLINE_M, EVERYWHERE, NO_GAIN, move_edges
 from .objective import compute_objective, compute_objective_with, compute_point_cost
 from .prices import BEGIN_SHARE, BEGIN_UNITS, PARAMETER_COST
 from .refit import refit
@@ -95,23 +95,6 @@ def refit_volume(volumes, scene, value, k, context):
     refit(trial, scene, k, context)
     trial_value = compute_objective_with(trial, scene, k, context, value)
     return (trial, trial_value) if trial_value < value - NO_GAIN else (volumes, value)
-
-
-@compiled
-def settle_volume(volumes, scene, value, k, reach):
-    """Refit volume k and move its edges within `reach` (m), where that helps."""
-    context = measure_context(volumes, scene.U, scene.V, scene.order, k)
-    volumes, value = refit_volume(volumes.copy(), scene, value, k, context)
-    value = move_edges(volumes, scene, k, value, reach, context)
-    return refit_volume(volumes, scene, value, k, context)
-
-
-def settle_volumes(volumes, scene):
-    """Refit the volumes and move their edges a little on every point of `scene`."""
-    volumes, value = refit_volumes(volumes, scene, compute_objective(volumes, scene, np.inf))
-    for k in range(1, len(volumes)):
-        volumes, value = settle_volume(volumes, scene, value, k, SETTLE_REACH_M)
-    return volumes, value
 
 
 @compiled

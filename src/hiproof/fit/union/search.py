@@ -11,7 +11,7 @@ import shapely
 from .allowed import list_allowed_shapes
 from .grow import grow
 from .large import find_in_blocks
-from .moves import settle_volumes
+from .moves import refit_volumes
 from .objective import compute_objective
 from .plan import Plan
 from .prices import LARGE_ROOF_M2, compute_unit_points
@@ -45,5 +45,6 @@ def find_volumes(
         return volumes, compute_objective(volumes, full_scene, np.inf), full_scene
     scene = thin_scene(full_scene, numbers, evidence[0])
     volumes, _ = grow(scene)
-    volumes, value = settle_volumes(volumes, full_scene)
+    value = compute_objective(volumes, full_scene, np.inf)
+    volumes, value = refit_volumes(volumes, full_scene, value)
     return *trim(volumes, full_scene, value), full_scene
