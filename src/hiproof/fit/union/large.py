@@ -23,8 +23,8 @@ from .window import end_at_border, open_window
 # Points of a block in which structure is searched: 2.7 per square metre of the largest block. With
 # a house's 600 points, dormers and annexes of blocks stay unseen.
 BLOCK_POINTS = 1600
-# Points of a block that settle its structure: 5 per square metre of the largest block.
-SETTLE_POINTS = 3000
+# Points of a block to which its planes are fitted again: 5 per square metre of the largest block.
+FULL_POINTS = 3000
 # Growing more than one volume anew gains nothing in blocks and costs a quarter of the time
 # (Vienna's even places at 5 points/m2).
 BLOCK = Effort(pool_points=1200, seeds=200, regrown=1)
@@ -95,15 +95,15 @@ def list_block_volumes(whole: Whole, box: Box) -> list[np.ndarray]:
 def search_block(whole: Whole, box: Box) -> tuple[np.ndarray, Scene] | None:
     """Find the volumes of a block by itself, its own base first.
 
-    Also returns the scene that settled them. Returns None for hardly a point.
+    Also returns the scene of more points that they fit. Returns None for hardly a point.
     """
-    scene, settling = open_window(whole, box, BLOCK_POINTS), open_window(whole, box, SETTLE_POINTS)
-    if scene is None or settling is None:
+    scene, full = open_window(whole, box, BLOCK_POINTS), open_window(whole, box, FULL_POINTS)
+    if scene is None or full is None:
         return None
     volumes = grow(scene, BLOCK)[0]
-    value = compute_objective(volumes, settling, np.inf)
-    volumes, value = refit_volumes(volumes, settling, value)
-    return trim(volumes, settling, value)[0], settling
+    value = compute_objective(volumes, full, np.inf)
+    volumes, value = refit_volumes(volumes, full, value)
+    return trim(volumes, full, value)[0], full
 
 
 def is_base_bare(volumes: np.ndarray, scene: Scene) -> bool:

@@ -1,6 +1,6 @@
 """Search the volumes of a plan.
 
-Structure is searched with some of the points, and settled on all of them.
+Structure is searched with some of the points, and fitted again to all of them.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from .prices import LARGE_ROOF_M2, compute_unit_points
 from .scene import Scene, find_directions, make_scene, thin_scene
 from .trim import trim
 
-SEARCH_POINTS = 600  # Points in which structure is searched. All of them settle it.
+SEARCH_POINTS = 600  # Points in which structure is searched.
 
 
 def find_volumes(
