@@ -91,7 +91,7 @@ def test_the_gain_of_a_min_of_planes_is_the_drop_of_truncated_cost(count):
     u, v, z = rng.uniform(-3.0, 3.0, (3, 60))
     cell = np.zeros(60, np.int64)
     planes, current, gain = rng.normal(0.0, 0.5, (5, 3)), rng.random(60), np.empty(60)
-    total = fill_point_gains(Cloud(u, v, z, cell, cell), planes[:count], current, 0.2, gain)
+    total = fill_point_gains(Cloud(u, v, z, cell, cell), planes, count, current, 0.2, gain)
     roof = (planes[:count, :1] * u + planes[:count, 1:2] * v + planes[:count, 2:]).min(axis=0)
     expected = current - np.array([truncate_cost(dz, 0.2) for dz in z - roof])
     assert gain == pytest.approx(expected)
@@ -130,7 +130,7 @@ def test_groups_of_planes_are_all_pairs_with_a_ridge_and_few_larger_ones():
     grid = Grid(np.arange(0.0, 12.5, 0.5), np.arange(0.0, 8.5, 0.5))
     slopes = [(0.7, 0.0, 3.0), (-0.7, 0.0, 11.4), (0.0, 0.7, 3.0), (0.0, -0.7, 8.6)]
     planes = np.array([*slopes, (0.0, 0.0, 5.0)])
-    groups, sizes = group_planes(planes, np.zeros((0, 2, 3)), grid)
+    groups, sizes = group_planes(planes, np.zeros((0, 5, 3)), np.zeros(0, np.int64), grid)
     result = {
         frozenset(map(tuple, group[:size].tolist()))
         for group, size in zip(groups, sizes, strict=True)

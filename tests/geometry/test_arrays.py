@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from hiproof.geometry.arrays import (
+    compute_median,
     copy_row,
     copy_rows,
     list_distinct,
@@ -33,6 +34,11 @@ def test_equal_values_keep_their_order(values):
     assert np.array_equal(sort_order(values), np.argsort(values, kind="stable"))
     assert np.array_equal(sort_values(values), np.sort(values))
     assert np.array_equal(list_distinct(values), np.unique(values))
+
+
+@given(values=arrays(float, st.integers(1, 70), elements=st.floats(-1e6, 1e6)))
+def test_the_median_is_numpys(values):
+    assert compute_median(values) == np.median(values)
 
 
 @pytest.mark.parametrize("n", [0, 1, 3])

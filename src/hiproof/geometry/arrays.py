@@ -77,6 +77,30 @@ def measure_range(values):
 
 
 @compiled
+def compute_median(values):
+    """Return the median of `values` (n,), float64, of which there is one at least.
+
+    They are sorted no further than it takes (Hoare's selection).
+    """
+    x, half, low, high = values.copy(), len(values) // 2, 0, len(values) - 1
+    while low < high:
+        pivot, i, j = x[half], low, high
+        while i <= j:
+            while x[i] < pivot:
+                i += 1
+            while pivot < x[j]:
+                j -= 1
+            if i <= j:
+                x[i], x[j] = x[j], x[i]
+                i, j = i + 1, j - 1
+        if j < half:
+            low = i
+        if half < i:
+            high = j
+    return x[half] if len(x) % 2 == 1 else 0.5 * (measure_range(x[:half])[1] + x[half])
+
+
+@compiled
 def list_distinct(values):
     """Return the distinct ones of `values` (n,), float64, in ascending order."""
     ordered, count = sort_values(values), 0

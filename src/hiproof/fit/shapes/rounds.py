@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
+from ...geometry.arrays import compute_median
 from ...geometry.rings import OVERLAY_GRID_M
 from ...model import Part
 from ...primitives.cants import list_cants
@@ -146,7 +147,7 @@ def measure_round_gaps(points: np.ndarray, centre: np.ndarray) -> np.ndarray:
         normal = some @ some.T + RIDGE * np.eye(len(some))
         solution = np.linalg.solve(normal, some @ points[is_near, 2])
         gaps = np.abs(points[:, 2] - solution @ design)
-        is_near = gaps <= max(LEAST_FALL_M, 2.0 * float(np.median(gaps)))
+        is_near = gaps <= max(LEAST_FALL_M, 2.0 * compute_median(gaps))
     falls = -r.max() * (solution[1] + solution[2] * r.max()) >= LEAST_FALL_M
     return gaps if falls else np.full(len(r), np.inf)
 

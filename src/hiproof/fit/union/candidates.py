@@ -118,10 +118,10 @@ def list_candidates_along(
     )
     if len(pool) == 0:
         return np.empty((0, COLUMNS))
-    gables = pool_gables(cloud, grid, pool, tolerance, evidence)
+    gables, counts = pool_gables(cloud, grid, pool, tolerance, evidence)
     middle = np.array([sort_values(u)[len(u) // 2], sort_values(v)[len(v) // 2]])
     along = turn_to_walls(pool, middle, scene.leans[direction])
-    groups, sizes = group_planes(along, gables, grid)
+    groups, sizes = group_planes(along, gables, counts, grid)
     return make_volumes(direction, groups, sizes, scene.allowed)
 
 
@@ -152,11 +152,12 @@ def turn_to_walls(pool, middle, leans):
 
 
 @compiled
-def group_planes(planes, gables, grid):
+def group_planes(planes, gables, counts, grid):
     """Return groups of planes (g, N_PLANES, 3) that may be volumes, and their sizes.
 
-    These are each plane, the `gables`, and all pairs that form a ridge. The strongest pairs also
-    make hips of two pairs across each other, and pairs and hips with a level top.
+    These are each plane, the `gables` of `counts` planes, and all pairs that form a ridge. The
+    strongest pairs also make hips of two pairs across each other, and pairs and hips with a level
+    top.
     """
     n = len(planes)
     most_groups = (
@@ -172,7 +173,7 @@ def group_planes(planes, gables, grid):
         sizes[m] = 1
     for m in range(n, n + len(gables)):
         copy_rows(groups[m], gables[m - n])
-        sizes[m] = 2
+        sizes[m] = counts[m - n]
     m = n + len(gables)
     for i in range(n):
         for j in range(i):

@@ -13,11 +13,12 @@ from collections import namedtuple
 import numpy as np
 
 from ...compiled import compiled
-from ...geometry.arrays import copy_row, copy_rows, list_distinct, sort_order
+from ...geometry.arrays import compute_median, copy_row, copy_rows, list_distinct, sort_order
 from .prices import KIND_COST
 
 MAX_SLOPE = 2.5  # Steepest slope (rise over run), 68 degrees.
 MIN_AXIS_SLOPE = 0.05  # A flatter plane (rise over run), 3 degrees, is level.
+PART_PLANES = 5  # Most planes of one part.
 # Ridge that keeps the slope of a plane determined when its points lie on a line.
 SLOPE_RIDGE = 2e-4
 NEIGHBOUR_RADIUS_M = 2.5  # Points further away (m) are no neighbours.
@@ -26,6 +27,7 @@ RIDGE_STEP_M = 0.4  # Distance (m) between the ridges tried, and of any from the
 PLANE_BIN = 0.05  # Planes nearer to each other (rise over run, and m at the centre) are one.
 PAIRS_A_SEED = 2  # Pairs of a seed and a point near it whose planes are tried.
 MOST_GABLES = 6  # Most gables of a pool: a limit on time.
+TEMPLATE_POINTS = 150  # Points that templates are fitted to: few are enough for a start.
 
 Cloud = namedtuple("Cloud", "u v z i j")  # Points (n,) and the grid cell of each.
 Grid = namedtuple("Grid", "u v")  # Grid lines, ascending.
@@ -167,7 +169,7 @@ def fit_symmetric_gable(cloud, members, planes, tau):
 
     Also returns False if they are no gable.
     """
-    fitted = planes.copy()
+    fitted = planes[:2].copy()
     kind = classify_plane(planes[0])
     if (kind != 1 and kind != 2) or classify_plane(planes[1]) != kind:
         return fitted, False
@@ -426,7 +428,7 @@ def find_best_rectangle(gain, least_sum, reach, column):
 
 
 @compiled
-def fill_point_gains(cloud, planes, current, tau, gain):
+def fill_point_gains(cloud, planes, count, current, tau, gain):
     """Fill `gain` (n,) with the drop of cost under the min of `planes`.
 
     Returns the sum over the points that gain.
@@ -434,7 +436,7 @@ def fill_point_gains(cloud, planes, current, tau, gain):
     a, b, c = planes[0]
     for q in range(len(gain)):
         gain[q] = a * cloud.u[q] + b * cloud.v[q] + c
-    for k in range(1, len(planes)):
+    for k in range(1, count):
         a, b, c = planes[k]
         for q in range(len(gain)):
             gain[q] = min(gain[q], a * cloud.u[q] + b * cloud.v[q] + c)
@@ -463,7 +465,7 @@ def fill_cell_gains(cloud, gain_of_point, gain):
 
 
 @compiled
-def find_best_candidate(cloud, candidates, bounds, current, tau, least_gain, gain):
+def find_best_candidate(cloud, candidates, counts, bounds, current, tau, least_gain, gain):
     """Find the candidate with the best rectangle.
 
     `bounds` are upper bounds of each candidate's gain, and costs only ever fall. Ever dearer bounds
@@ -474,14 +476,16 @@ def find_best_candidate(cloud, candidates, bounds, current, tau, least_gain, gai
     gain_of_point = np.empty(len(cloud.u))
     for m in range(len(bounds)):
         if bounds[m] == np.inf:
-            bounds[m] = fill_point_gains(cloud, candidates[m], current, tau, gain_of_point)
+            bounds[m] = fill_point_gains(
+                cloud, candidates[m], counts[m], current, tau, gain_of_point
+            )
     best, number, rectangle = least_gain, -1, (0, 0, 0, 0)
     reach, column = np.empty(len(gain) + 1), np.empty(gain.shape[1])
     promising = np.nonzero(bounds > least_gain)[0]
     for m in promising[sort_order(-bounds[promising])]:
         if bounds[m] <= best:
             break
-        bounds[m] = fill_point_gains(cloud, candidates[m], current, tau, gain_of_point)
+        bounds[m] = fill_point_gains(cloud, candidates[m], counts[m], current, tau, gain_of_point)
         if bounds[m] <= best:
             continue
         bounds[m] = fill_cell_gains(cloud, gain_of_point, gain)
@@ -519,10 +523,11 @@ def pool_planes(cloud, grid, candidates, tau, evidence, most_planes):
     current = np.ones(len(cloud.u))
     bounds = np.full(len(candidates), np.inf)
     stacked = candidates.reshape((len(candidates), 1, 3))
+    counts = np.ones(len(candidates), np.int64)
     pool = np.zeros((most_planes, 3))
     for k in range(most_planes):
         _, m, rectangle = find_best_candidate(
-            cloud, stacked, bounds, current, tau, 1.5 * evidence, gain
+            cloud, stacked, counts, bounds, current, tau, 1.5 * evidence, gain
         )
         if m < 0:
             return pool[:k]
@@ -538,11 +543,11 @@ def pool_planes(cloud, grid, candidates, tau, evidence, most_planes):
 def mirror_gables(pool, grid):
     """Mirror every axis-sloped plane of the pool about ridges RIDGE_STEP_M apart.
 
-    Returns candidates (m, 2, 3).
+    Returns candidates (m, PART_PLANES, 3).
     """
     steps_u = int((grid.u[-1] - grid.u[0]) / RIDGE_STEP_M) + 2
     steps_v = int((grid.v[-1] - grid.v[0]) / RIDGE_STEP_M) + 2
-    out = np.zeros((len(pool) * (steps_u + steps_v), 2, 3))
+    out = np.zeros((len(pool) * (steps_u + steps_v), PART_PLANES, 3))
     m = 0
     for plane in pool:
         kind = classify_plane(plane)
@@ -563,21 +568,132 @@ def mirror_gables(pool, grid):
 
 
 @compiled
+def fill_symmetric_planes(height, slope_u, top_u, centre_u, slope_v, top_v, centre_v, out):
+    """Fill `out` with planes of a roof symmetric about its centre, and count them.
+
+    It is z = height - max(slope_u (|u - centre_u| - top_u), slope_v (...)). A slope of 0 leaves its
+    pair out.
+    """
+    k = 0
+    for axis in range(2):
+        slope, top, centre = (slope_u, top_u, centre_u) if axis == 0 else (slope_v, top_v, centre_v)
+        if slope > 0.0:
+            for sign in (1.0, -1.0):
+                out[k] = 0.0
+                out[k, axis] = sign * slope
+                out[k, 2] = height + slope * (top - sign * centre)
+                k += 1
+    return k
+
+
+@compiled
+def fit_template(z, drop, slope, tau):
+    """Fit height and slope of z = height - slope * drop (n,) robustly.
+
+    It begins with a start slope. The slope is 0 if it fails.
+    """
+    height, weights = compute_median(z + slope * drop), np.empty(len(drop))
+    for step in range(5):
+        scale = tau * (3.0 if step == 0 else 2.0 if step == 1 else 1.5)
+        n = sx = sy = sxx = sxy = 0.0
+        for i in range(len(drop)):  # no branches: a processor does several points at once
+            r = (z[i] - height + slope * drop[i]) / scale
+            w = 1.0 - r * r
+            weights[i] = w * w if w > 0.0 else 0.0
+        for i in range(len(drop)):
+            w = weights[i]
+            n += w
+            sx += w * drop[i]
+            sy += w * z[i]
+            sxx += w * drop[i] * drop[i]
+            sxy += w * drop[i] * z[i]
+        determinant = n * sxx - sx * sx
+        if n < 2.0 or determinant < 1e-6:
+            return height, 0.0
+        slope = -(n * sxy - sx * sy) / determinant
+        height = (sy + slope * sx) / n
+        if not MIN_AXIS_SLOPE < slope < MAX_SLOPE:
+            return height, 0.0
+    return height, slope
+
+
+@compiled
+def fit_whole_roofs(cloud, grid, tau):
+    """Fit gables, a pyramid and a hip over the whole plan from several start slopes.
+
+    Returns candidates (m, PART_PLANES, 3) and counts. Few points are enough: at most twice
+    TEMPLATE_POINTS of the cloud's are used.
+    """
+    stride = max(1, len(cloud.u) // TEMPLATE_POINTS)
+    u, v, z = cloud.u[::stride].copy(), cloud.v[::stride].copy(), cloud.z[::stride].copy()
+    out, counts, m = np.zeros((64, PART_PLANES, 3)), np.zeros(64, np.int64), 0
+    half_u, half_v = 0.5 * (grid.u[-1] - grid.u[0]), 0.5 * (grid.v[-1] - grid.v[0])
+    mid_u, mid_v = grid.u[0] + half_u, grid.v[0] + half_v
+    long = 0 if half_u >= half_v else 1
+    for shape in range(8):
+        shift = (0.0, 0.25, -0.25)[shape % 3] if shape < 6 else 0.0
+        centre_u, centre_v = (
+            mid_u + shift * half_u * (shape < 3),
+            mid_v + shift * half_v * (shape >= 3),
+        )
+        away_u, away_v = np.abs(u - centre_u), np.abs(v - centre_v)
+        ratio, top = 1.0, 0.0
+        if shape < 3:
+            drop = away_u
+        elif shape < 6:
+            drop = away_v
+        elif shape == 6:  # pyramid: drop in units of v
+            ratio = half_v / half_u
+            drop = np.maximum(away_u * ratio, away_v)
+        else:  # hip with one slope
+            top = abs(half_u - half_v)
+            drop = np.maximum(away_u - top * (long == 0), away_v - top * (long == 1))
+        for start in (0.2, 0.45, 0.8, 1.3):
+            height, slope = fit_template(z, drop, start, tau)
+            if slope == 0.0:
+                continue
+            slope_u = slope * ratio if shape < 3 or shape >= 6 else 0.0
+            slope_v = slope if shape >= 3 else 0.0
+            counts[m] = fill_symmetric_planes(
+                height,
+                slope_u,
+                top * (long == 0),
+                centre_u,
+                slope_v,
+                top * (long == 1),
+                centre_v,
+                out[m],
+            )
+            m += 1
+    return out[:m], counts[:m]
+
+
+@compiled
 def pool_gables(cloud, grid, pool, tau, evidence):
-    """Pool symmetric gables (k, 2, 3) greedily, and refit them."""
+    """Pool symmetric gables, pyramids and hips (k, PART_PLANES, 3) greedily.
+
+    Also returns their counts of planes. Gables are refitted.
+    """
     gain = np.empty((len(grid.u) - 1, len(grid.v) - 1))
-    candidates = mirror_gables(pool, grid)
+    mirrored = mirror_gables(pool, grid)
+    whole, whole_counts = fit_whole_roofs(cloud, grid, tau)
+    candidates = np.concatenate((mirrored, whole))
+    counts = np.concatenate((np.full(len(mirrored), 2, np.int64), whole_counts))
     bounds = np.full(len(candidates), np.inf)
     current = np.ones(len(cloud.u))
-    gables = np.zeros((MOST_GABLES, 2, 3))
+    gables, gable_counts = np.zeros((MOST_GABLES, PART_PLANES, 3)), np.zeros(MOST_GABLES, np.int64)
     for k in range(MOST_GABLES):
         _, m, rectangle = find_best_candidate(
-            cloud, candidates, bounds, current, tau, 1.5 * evidence, gain
+            cloud, candidates, counts, bounds, current, tau, 1.5 * evidence, gain
         )
         if m < 0:
-            return gables[:k]
+            return gables[:k], gable_counts[:k]
         members = select_members(cloud, rectangle)
-        fitted, ok = fit_symmetric_gable(cloud, members, candidates[m], tau)
-        copy_rows(gables[k], fitted if ok else candidates[m])
-        lower_costs(cloud, members, candidates[m], tau, current)
-    return gables
+        copy_rows(gables[k], candidates[m])
+        gable_counts[k] = counts[m]
+        if counts[m] == 2:
+            fitted, ok = fit_symmetric_gable(cloud, members, candidates[m], tau)
+            if ok:
+                copy_rows(gables[k], fitted)
+        lower_costs(cloud, members, candidates[m, : counts[m]], tau, current)
+    return gables, gable_counts
