@@ -233,11 +233,11 @@ def test_the_main_process_of_workers_imports_no_compiler(town_files, tmp_path):
         "import sys; from hiproof import Request, reconstruct_area\n"
         "cloud, footprints, out = sys.argv[1:]\n"
         "summary = reconstruct_area(Request((cloud,), out, footprints, processes=2))\n"
-        "print(summary.overview.headline, [m for m in ('numba', 'scipy') if m in sys.modules])"
+        "print(summary.overview.headline, 'numba' in sys.modules)"
     )
     command = [sys.executable, "-W", "ignore", "-c", code, *map(str, town_files), str(tmp_path)]
     done = subprocess.run(command, capture_output=True, text=True)
-    assert done.stdout == "4 of 4 buildings modelled []\n", done.stderr
+    assert done.stdout == "4 of 4 buildings modelled False\n", done.stderr
 
 
 def test_an_interrupted_run_goes_on_and_ends_the_same(finished_run, files, tmp_path, monkeypatch):

@@ -114,7 +114,7 @@ def test_houses_beside_a_higher_one_are_told_apart():
     fit = fit_building(np.column_stack([xy, z]), outline)
     assert [part.type for part in fit.roof_parts] == ["gable"] * 3
     lengths = sorted(part.parameters["length"] for part in fit.roof_parts)
-    assert lengths == pytest.approx([6.0, 6.0, 6.0], abs=0.2)
+    assert lengths == pytest.approx([6.0, 6.0, 6.0], abs=0.35)  # how far points lie apart
 
 
 def test_gables_at_both_walls_below_a_ridge_are_two():
