@@ -42,11 +42,14 @@ ROWS = np.array([1, 16, 16])  # Most volumes, lines and unknowns that a new volu
 
 def add_volumes(roof: Tables, trial: Tables, site: Site, drawing: Drawing, whole: Whole) -> bool:
     """Add volumes to a roof at each place where that saves. Returns whether any was added."""
-    has_added = False
+    has_added, nobody = False, np.zeros(len(roof.sides), np.bool_)
+    price = improve(roof, trial, site, drawing, nobody, 1)
     for box in list_places(roof, site):
-        scene = open_window(whole, box, EFFORT.pool_points)
-        while scene is not None and add_best(roof, trial, site, drawing, scene):
-            has_added = True
+        scene, last = open_window(whole, box, EFFORT.pool_points), np.inf
+        while scene is not None and price < last:
+            last = price
+            price = add_best(roof, trial, site, drawing, scene, price)
+            has_added |= price < last
     return has_added
 
 
@@ -69,25 +72,26 @@ def list_places(roof: Tables, site: Site) -> Iterator[Box]:
         counts[a : a + size, b : b + size] = 0.0
 
 
-def add_best(roof: Tables, trial: Tables, site: Site, drawing: Drawing, scene: Scene) -> bool:
-    """Add the volume that saves most in a window. Returns whether one does."""
+def add_best(
+    roof: Tables, trial: Tables, site: Site, drawing: Drawing, scene: Scene, price: float
+) -> float:
+    """Add the volume that saves most in a window to a roof with a `price`. Returns the new one."""
     if (roof.counts + ROWS > [len(roof.sides), len(roof.lines), len(roof.values)]).any():
-        return False
-    nobody = np.zeros(len(roof.sides), np.bool_)
-    lowest = improve(roof, trial, site, drawing, nobody, 1) - LEAST_UNITS * site.unit
+        return price
+    lowest = price - LEAST_UNITS * site.unit
     best, new = None, make_tables_like(roof)
     for volume in list_additions(roof, scene):
         copy_tables(roof, new)
         k = add_volume(new, volume, scene.turn)
         put_on_walls(new, k, site)
-        asked = nobody.copy()
-        asked[k] = True
+        asked = np.arange(len(roof.sides)) == k
         cost = improve(new, trial, site, drawing, asked, 1)
         if cost < lowest:
             best, new, lowest = new, make_tables_like(roof), cost
-    if best is not None:
-        copy_tables(best, roof)
-    return best is not None
+    if best is None:
+        return price
+    copy_tables(best, roof)
+    return lowest
 
 
 def list_additions(roof: Tables, scene: Scene) -> Iterator[np.ndarray]:
