@@ -146,7 +146,7 @@ def improve(roof, trial, site, drawing, asked, rounds):
         known = know(roof, drawing, site)
         price = price_known(known, site)
         if price > lowest - least:
-            break
+            return price
         lowest = price
         count = list_moves(roof, site, asked, moves)
         for m in range(count):

@@ -42,15 +42,14 @@ ROWS = np.array([1, 16, 16])  # Most volumes, lines and unknowns that a new volu
 
 def add_volumes(roof: Tables, trial: Tables, site: Site, drawing: Drawing, whole: Whole) -> bool:
     """Add volumes to a roof at each place where that saves. Returns whether any was added."""
-    has_added, nobody = False, np.zeros(len(roof.sides), np.bool_)
-    price = improve(roof, trial, site, drawing, nobody, 1)
+    nobody = np.zeros(len(roof.sides), np.bool_)
+    start = price = improve(roof, trial, site, drawing, nobody, 1)
     for box in list_places(roof, site):
         scene, last = open_window(whole, box, EFFORT.pool_points), np.inf
         while scene is not None and price < last:
             last = price
             price = add_best(roof, trial, site, drawing, scene, price)
-            has_added |= price < last
-    return has_added
+    return price < start
 
 
 def list_places(roof: Tables, site: Site) -> Iterator[Box]:

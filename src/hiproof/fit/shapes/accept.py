@@ -34,6 +34,7 @@ UNDER_SHARE = 0.6  # Share of a part's points or area over which a shape lies to
 SAME_CORNER_M = 0.02  # Corners so near to a rim (m) lie on it.
 SAME_LEVEL_M = 0.15  # Points and parts so near to a level (m) belong to it.
 LEAST_UNITS = VOLUME_UNITS + 2.0 * UNKNOWN_UNITS  # Of a curved shape, with height and slope.
+CIRCLE_NUMBERS = 3  # A circle has a middle and a radius.
 NO_HEIGHTS = np.zeros(0)  # What is not seen has no heights.
 
 

@@ -14,12 +14,11 @@ import shapely
 
 from ...model import Part, Piece
 from ...primitives.facets import CHORD_M, find_apothem, find_sides, make_rim
-from .accept import SAME_LEVEL_M, PartsRoof
+from .accept import CIRCLE_NUMBERS, SAME_LEVEL_M, PartsRoof
 from .arcs import TURRET_DEG, Arc, cut_to_outline
 from .regions import select_touching, unite_outlines
 
 BEYOND_DRUM = 1.5  # Points within so many radii show the step.
-DRUM_NUMBERS = 3  # A circle has a middle and a radius.
 CIRCLE_ROUNDS = 3  # Rounds in which the circle is found.
 EDGE_SOFTNESS_M = (0.3, 0.2, 0.1, 0.05)  # How far off its side (m) points may lie, round by round.
 FEWEST_LEVEL_POINTS = 12  # Fewer show no circle.
@@ -48,7 +47,7 @@ def list_drums(roof: PartsRoof, part: Part, own: np.ndarray) -> Iterator[tuple[P
         circle, right_share = find_circle(roof, level, start)
         drum = make_drum(circle[:2], float(circle[2]), level)
         if right_share > 0.0 and shapely.covers(roof.outline, drum.outlines[0]):
-            yield drum, DRUM_NUMBERS
+            yield drum, CIRCLE_NUMBERS
 
 
 def find_circle(roof: PartsRoof, level: float, start: np.ndarray) -> tuple[np.ndarray, float]:
@@ -65,7 +64,7 @@ def find_circle(roof: PartsRoof, level: float, start: np.ndarray) -> tuple[np.nd
     near = roof.find_near(centre, BEYOND_DRUM * circle[2])
     disc = roof.points[near]
     sign = np.where(np.abs(disc[:, 2] - level) <= SAME_LEVEL_M, 1.0, -1.0)
-    if not roof.is_worth(near, roof.misfits[near[sign < 0.0]].sum(), DRUM_NUMBERS):
+    if not roof.is_worth(near, roof.misfits[near[sign < 0.0]].sum(), CIRCLE_NUMBERS):
         return circle, 0.0
     right_share = measure_right_share(disc, sign, circle)
     for softness in EDGE_SOFTNESS_M:

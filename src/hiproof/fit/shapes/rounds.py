@@ -18,7 +18,7 @@ from ...primitives.catalogue import CATALOGUE
 from ...primitives.cone import BROACH_SIDES, HEXAGON_SIDES
 from ...primitives.contract import CX, CY, HALF_LENGTH, HALF_WIDTH, KAPPA, Q0, Q1, Primitive
 from ...primitives.facets import find_apothem
-from .accept import PartsRoof
+from .accept import CIRCLE_NUMBERS, PartsRoof
 from .arcs import APSE_DEG, TURRET_DEG, Arc, cut_to_outline
 from .regions import cut_part, list_polygons
 
@@ -45,7 +45,6 @@ ROUND_SHAPES = {
 }
 RADII = (0.6, 0.9, 1.35, 2.0, 3.0)  # Of discs around a top, in radii of its part's area.
 LEAST_FALL_M = 0.3  # Least fall (m) from the top: less is a level roof.
-CIRCLE_NUMBERS = 3  # A circle has a middle and a radius.
 FEWEST_POINTS = 6  # A slope and a height, and as many points again to check them.
 CENTRE_ROUNDS = 3  # Rounds in which the middle of a disc is found.
 RIDGE = 1e-6  # It keeps what no point determines.
@@ -99,9 +98,9 @@ def list_top_shapes(
         if not roof.is_worth(disc, misfit, CIRCLE_NUMBERS):
             continue
         theta = np.array([*centre, part.kappa, radius, radius, 0.0, 0.0, 0.0, 0.0])
+        around = roof.points[roof.find_near(centre, GROWTH * radius)]
         for name in names:
             shape, free = CATALOGUE[name], ROUND_SHAPES[name].free
-            around = roof.points[roof.find_near(centre, GROWTH * radius)]
             fitted = fit_followers(around, shape, theta, free, HALF_WIDTH not in free)
             if fitted is not None:
                 ring = fitted.pieces[0].outline
