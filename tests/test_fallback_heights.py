@@ -12,8 +12,9 @@ from hiproof.city.run import reconstruct_area
 from hiproof.compose import check_solid
 from hiproof.errors import InputError, SettingsError
 from hiproof.parametric.building import build
+from hiproof.parametric.fallback import read_fallback
 from hiproof.parametric.run import build_file
-from hiproof.settings import Settings
+from hiproof.settings import ReadSettings, Settings
 from run_records import by_id, records
 from tiny_town import ORIGIN, make_town, write_cloud
 
@@ -125,3 +126,11 @@ def test_bad_columns_are_refused_in_a_sentence(files, tmp_path):
         run(cloud, footprints, tmp_path / "a", fallback_roof_height="+hight")
     with pytest.raises(SettingsError, match="only --fallback-roof-height takes"):
         run(cloud, footprints, tmp_path / "b", fallback_ground_height="+ground")
+
+
+@pytest.mark.parametrize("code", [-9999, 9999, 9999.0, "9999", 99999, -32767, 1e30])
+@pytest.mark.parametrize("column", ["roof", "+roof"])
+def test_codes_for_no_data_are_no_heights(column, code):
+    read = ReadSettings(fallback_roof_height=column, fallback_ground_height="ground")
+    heights = read_fallback({"roof": code, "ground": code}, read)
+    assert (heights.roof_m, heights.block_m, heights.ground_m) == (None, None, None)

@@ -181,9 +181,9 @@ def test_a_part_list_that_makes_no_roof_is_one_sentence(gable_scan):
         ({"id": "a", "fixed": {"height": "high"}}, "a number as height"),
         (
             {"id": "a", "ridge_height": 1e9},
-            "ridge_height from -600 to 10000 in the override of 'a', got 1e\\+09",
+            "ridge_height from -600 to 9000 in the override of 'a', got 1e\\+09",
         ),
-        ({"id": "a", "z_ground": -9999}, "z_ground from -600 to 10000 in the override of 'a'"),
+        ({"id": "a", "z_ground": -9999}, "z_ground from -600 to 9000 in the override of 'a'"),
         ({"id": "a", "block_height": 1e6}, "block_height from 0.1 to 1000 in the override of 'a'"),
         ("hip", "an object as an override"),
     ],
@@ -351,7 +351,7 @@ def test_a_ground_of_0_counts_and_codes_are_left_out_and_told(tmp_path, kind):
     town = make_town(houses=4)
     values = [kind(value) for value in (0.0, -0.5, -9999.0, 3.4e38)]
     with pytest.warns(
-        InputWarning, match="z_ground from -600 to 10000, left out 2 of its values: -9999"
+        InputWarning, match="z_ground from -600 to 9000, left out 2 of its values: -9999"
     ):
         rows = columns_run(tmp_path, "z_ground", values, town)
     z = {id: row["z_ground"] for id, row in rows.items()}

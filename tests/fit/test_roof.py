@@ -5,7 +5,7 @@ import pytest
 import shapely
 
 from hiproof.fit.prices import compute_unit
-from hiproof.fit.roof import fit_building, improve_all, read_parts, start_roof
+from hiproof.fit.roof import add, fit_building, improve_all, read_parts, start_roof
 from hiproof.fit.roof.accept import fit_roof, try_move
 from hiproof.fit.roof.draw import (
     compute_height,
@@ -190,3 +190,41 @@ def test_a_roof_does_not_depend_on_the_order_of_its_points(kind):
     shuffled = fit_building(np.random.default_rng(3).permutation(points), outline)
     for part, other in zip(fit.roof_parts, shuffled.roof_parts, strict=True):
         assert (part.type, part.parameters) == (other.type, other.parameters)
+
+
+def scan_cluttered_roof(seed):
+    """Return the points (n, 3) of a large gable with boxes at all angles, and its outline."""
+    rng, n = np.random.default_rng(seed), 4000
+    x, y = rng.uniform(0.0, [[30.0], [22.0]], (2, n))
+    z = 16.0 - 0.5 * np.abs(y - 11.0)
+    for u0, v0, turn in rng.uniform(0.0, [30.0, 22.0, 1.5], (25, 3)):
+        u, v = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]]) @ [
+            x - u0,
+            y - v0,
+        ]
+        width, length = rng.uniform(0.5, 3.5, 2)
+        inside = (np.abs(u) < width) & (np.abs(v) < length)
+        a, b = rng.uniform(-1.0, 1.0, 2)
+        z[inside] = 14.0 + rng.uniform(-2.0, 4.0) + a * u[inside] + b * v[inside]
+    return np.column_stack([x, y, z + rng.normal(0.0, 0.03, n)]), shapely.box(0.0, 0.0, 30.0, 22.0)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_volumes_are_added_to_a_large_roof_while_its_price_falls(seed, monkeypatch):
+    """Else volumes that a roof fitted anew drops again are added without end."""
+    sites, prices, list_additions = [], [], add.list_additions
+
+    def note_site(roof, site):
+        sites.append(site)
+        return list_places(roof, site)
+
+    def note_price(roof, scene):
+        prices.append((scene, price(roof, sites[-1])))
+        assert len(prices) < 2 or prices[-2][0] is not scene or prices[-2][1] > prices[-1][1]
+        return list_additions(roof, scene)
+
+    list_places = add.list_places
+    monkeypatch.setattr(add, "list_places", note_site)
+    monkeypatch.setattr(add, "list_additions", note_price)
+    fit_building(*scan_cluttered_roof(seed))
+    assert prices

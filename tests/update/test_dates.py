@@ -1,6 +1,7 @@
 """The date of a survey: only days on which one can have been made are used."""
 
 import datetime
+import shutil
 import struct
 
 import laspy
@@ -98,3 +99,18 @@ def test_a_file_without_a_date_asks_for_one(tmp_path):
     (tmp_path / "a.xyz").write_text("1 2 3\n")
     with pytest.raises(InputError, match="--date"):
         find_survey_date((str(tmp_path / "a.xyz"),))
+
+
+@pytest.mark.parametrize(("named", "is_refused"), [("", True), ("2019-06-01", False)])
+def test_files_written_before_those_of_the_run_need_a_named_day(write, named, is_refused):
+    untimed = np.zeros(50)
+    earlier = write(untimed, day=200)
+    kept = earlier[0].replace("a.las", "earlier.las")
+    shutil.move(earlier[0], kept)
+    clouds = write(untimed, day=150)
+    if is_refused:
+        with pytest.raises(InputError, match=r"no older than that of the run, 2019-07-19.*--date"):
+            find_survey_date(clouds, named, "", (kept,))
+    else:
+        assert find_survey_date(clouds, named, "", (kept,)) == named
+    assert find_survey_date(write(untimed, day=201), "", "", (kept,)) == "2019-07-20"

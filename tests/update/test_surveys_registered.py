@@ -8,12 +8,15 @@ import pytest
 
 from hiproof import SettingsError
 from hiproof.frames import LocalFrame
+from hiproof.model import Roof
 from hiproof.settings import ReadSettings
 from hiproof.simulate import random_building
+from hiproof.simulate.shapes import make_part
 from hiproof.update.register import SampledRoof, SurveyShift, read_shift, register_surveys
 
 READ = ReadSettings()
 SIDE_M = 190.0
+SHED = {"width": 8.0, "length": 12.0, "height": 5.0}
 
 
 def scan(rng, roof, density=8.0):
@@ -63,6 +66,21 @@ def test_a_change_of_all_houses_is_no_shift(count, rise):
     found = register_surveys(draw_samples(1, [rise] * count), READ)
     assert found.clear_xyz[2] == 0.0
     assert "expected ground and roofs to lie alike" in found.doubt
+
+
+@pytest.mark.parametrize("rise", [0.0, 0.2, 0.4, 0.7])
+@pytest.mark.parametrize("seed", range(3))
+def test_slopes_that_face_one_way_and_rose_are_not_moved_aside(seed, rise):
+    """A roof moved along its slope is a roof raised: only slopes of other sides tell which."""
+    rng, samples = np.random.default_rng(seed), []
+    for place in rng.uniform(0, SIDE_M, (9, 2)):
+        part = make_part("monopitch", SHED, 0.3, np.array([0.0, 0.0, 6.0]))
+        roof = Roof((part,), part.outlines[0], LocalFrame(np.array([*place, 0.0])))
+        ground = np.column_stack([place + rng.uniform(-15, 15, (80, 2)), rng.normal(0, 0.04, 80)])
+        samples.append(SampledRoof(roof, scan(rng, roof), scan(rng, roof) + [0, 0, rise], ground))
+    found = register_surveys(samples, READ)
+    assert found.clear_xyz.tolist() == [0.0, 0.0, 0.0]
+    assert ("expected ground and roofs to lie alike" in found.doubt) is (rise > 0.0)
 
 
 def test_a_shift_that_no_roof_shares_with_the_ground_is_not_taken_off():

@@ -280,7 +280,8 @@ def test_the_same_call_again_keeps_what_is_done(update, run, cloud):
 
 def test_an_update_of_an_update_starts_from_its_models(update, cloud, tmp_path):
     _, out, _ = update
-    summary = update_area(make_request(out, cloud, tmp_path, date="2025-05-01"))
+    again = shutil.copy(cloud, tmp_path / "again.laz")
+    summary = update_area(make_request(out, str(again), tmp_path, date="2025-05-01"))
     assert summary.by_change == {"unchanged": 4}
     lines = [(f / "parameters.jsonl").read_bytes().splitlines() for f in (tmp_path, out)]
     assert lines[0][1:] == lines[1][1:]
@@ -417,6 +418,47 @@ def test_bad_input_is_refused_in_a_sentence(run, cloud, tmp_path):
     with pytest.raises(InputError, match=r"building house-1 in .*parameters\.jsonl"):
         update_area(make_request(run, cloud, tmp_path / "out"))
     assert not (tmp_path / "out" / "parameters.jsonl").exists()
+
+
+def test_a_survey_that_took_the_place_of_the_earlier_file_is_refused(town_files, tmp_path):
+    """Compared with itself it would show no change."""
+    cloud = shutil.copy(town_files[0], tmp_path / "tile.laz")
+    reconstruct_area(Request((str(cloud),), tmp_path / "run", town_files[1]))
+    write_cloud(cloud, *make_later_survey())
+    link = tmp_path / "link.laz"
+    link.symlink_to(cloud)
+    for same in (cloud, link, tmp_path / "run" / ".." / "tile.laz"):
+        with pytest.raises(InputError, match="of which the run was made; name others"):
+            update_area(make_request(tmp_path / "run", str(same), tmp_path / "out"))
+    moved = str(shutil.move(cloud, tmp_path / "moved.laz"))
+    summary = update_area(make_request(tmp_path / "run", moved, tmp_path / "out"))
+    assert summary.by_change == {"unchanged": 2, "changed": 1, "gone": 1}
+
+
+def test_new_footprints_that_lie_elsewhere_are_refused(run, cloud, tmp_path):
+    far = {"far": shapely.affinity.translate(make_town().footprints["house-0"], 9000.0)}
+    request = make_request(run, cloud, tmp_path / "out", footprints=draw_footprints(tmp_path, far))
+    with pytest.raises(InputError, match="expected footprints that overlap the cloud"):
+        update_area(request)
+
+
+def test_what_changed_most_comes_first_where_an_outline_grew(run, tmp_path):
+    """A house gets a wing as large as itself, and a dormer."""
+    town = make_town(seed=7)
+    house = town.footprints["house-1"]
+    wing = shapely.affinity.translate(house, 0.0, house.bounds[3] - house.bounds[1])
+    xyz, classes = town.xyz.copy(), town.classification.copy()
+    x, y = xyz[:, :2].T
+    inside = shapely.intersects_xy(wing, x, y)
+    xyz[inside, 2], classes[inside] = ORIGIN[2] + 3.5, 6
+    xyz[shapely.intersects_xy(house.centroid.buffer(1.5, 1), x, y), 2] += 1.5
+    outlines = {"large": shapely.union_all([house, wing], grid_size=0.01)}
+    files = draw_footprints(tmp_path, outlines)
+    grown = str(write_cloud(tmp_path / "grown.laz", xyz, classes))
+    update_area(make_request(run, grown, tmp_path / "out", footprints=files))
+    places = by_id(tmp_path / "out")["house-1"]["change"]["places"]
+    assert places[0]["kind"] == "outline_changed"
+    assert len(places) > 1
 
 
 def far_cloud(folder, xyz, classes):

@@ -68,10 +68,7 @@ along the walls.
 """
 
 RANGES = {
-    **dict.fromkeys(
-        ("z_ground", "ridge_height", "eave_height"),
-        (LOWEST_LAND_M, HIGHEST_LAND_M + HIGHEST_BUILDING_M),
-    ),
+    **dict.fromkeys(("z_ground", "ridge_height", "eave_height"), (LOWEST_LAND_M, HIGHEST_LAND_M)),
     "block_height": (0.1, HIGHEST_BUILDING_M),
     "parts": (1.0, float(MOST_PARTS)),
 }

@@ -32,13 +32,21 @@ LAS_HEAD_BYTES = 94  # of a LAS file, up to the date
 FIRST_POINTS = 1000  # whose time tells the day of a file
 
 
-def find_survey_date(clouds: tuple[str, ...], named: str = "", earlier: str = "") -> str:
+def find_survey_date(
+    clouds: tuple[str, ...],
+    named: str = "",
+    earlier: str = "",
+    earlier_clouds: tuple[str, ...] = (),
+) -> str:
     """Return the date of a survey as 2014-02-09: the latest of its files.
 
-    `earlier` is the date of the survey before, or its year, "" where it is unknown. Raises
+    `earlier` is the date of the survey before, or its year, "" where it is unknown. Then a survey
+    that is dated by headers has to be no older than those of the `earlier_clouds`. Raises
     InputError where `named` is no date, where nothing tells one, or where it is before `earlier`.
     """
     date = read_date(named) if named else read_survey_date(clouds)
+    if not (earlier or named or date_by_points(clouds)):
+        earlier = date_by_headers(earlier_clouds)
     if date[: len(earlier)] < earlier:
         raise InputError(
             f"expected a survey no older than that of the run, {earlier}, got {mask(clouds[0])} "
@@ -53,13 +61,12 @@ def read_survey_date(clouds: tuple[str, ...]) -> str:
     timed = date_by_points(clouds)
     if timed:
         return timed
-    headed = [date for date in map(date_by_header, clouds) if date]
-    if not headed:
+    date = date_by_headers(clouds)
+    if not date:
         raise InputError(
             f"expected clouds that tell when they were surveyed, got {mask(clouds[0])} without a "
             "date; name the day of the survey with --date 2014-02-09"
         )
-    date = max(headed).isoformat()
     warnings.warn(
         f"{mask(clouds[0])}: holds no time of its points that can be used; the survey is dated "
         f"{date}, when the file was written; name the day of the survey with --date",
@@ -84,6 +91,12 @@ def read_date(text: str) -> str:
     if date > datetime.date.today():
         warnings.warn(f"the survey of {date} is dated in the future; check --date", InputWarning)
     return date.isoformat()
+
+
+def date_by_headers(clouds: tuple[str, ...]) -> str:
+    """Return the last day on which LAS files were written, "" for none."""
+    headed = [date for date in map(date_by_header, clouds) if date]
+    return max(headed).isoformat() if headed else ""
 
 
 def date_by_header(path: str) -> datetime.date | None:

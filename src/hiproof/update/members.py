@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 import shapely
 
-from ..city.plan.frame import AreaFrame
+from ..city.plan.frame import AreaFrame, plan_bounds
+from ..city.plan.overlap import check_overlap
 from ..city.plan.prepare import read_requested_footprints
 from ..city.plan.registration import register_footprints
 from ..city.plan.work_plan import Job, make_job
@@ -202,6 +203,8 @@ def make_members(
         return tuple(kept)
     footprints = read_requested_footprints(request, frame, where=None, bbox=None)
     footprints = leave_out_copies(footprints, request.footprints)
+    bounds = frame.units.to_metres(plan_bounds(headers).reshape(-1, 2)).reshape(-1, 4)
+    check_overlap(footprints, bounds.tolist(), frame.footprints, frame.cloud, frame.units)
     registration = register_footprints(
         footprints, headers, frame.units, settings, request.footprints
     )

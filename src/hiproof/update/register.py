@@ -344,11 +344,10 @@ def solve_shift(
 
     Every building has the weight of one observation of ROOF_ERROR_M; errors of its points go
     together, so the variance is that between buildings (a sandwich estimate). The height begins at
-    `start_m`. That of the ground is one more observation, and is held in the coarse steps.
+    `start_m`. That of the ground is held in the coarse steps alone: with it to the end, slopes that
+    face one way would be moved aside where they rose.
     """
     shift = np.array([0.0, 0.0, start_m])
-    if has_ground:
-        rows = [*rows, (np.array([[0.0, 0.0, 1.0]]), np.array([start_m]))]
     for scale in (*SHIFT_SCALES_M, *SHIFT_SCALES_M[-1:] * 2):
         is_held = has_ground and scale > SHIFT_SCALES_M[-1]
         prior = np.diag([PRIOR_M**-2, PRIOR_M**-2, HELD_WEIGHT if is_held else 0.0])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 import shutil
 from collections import Counter
 from dataclasses import dataclass
@@ -17,6 +18,8 @@ from ..city.plan.work_plan import WorkPlan
 from ..city.run import Steps, Summary, extend_run_record, reconstruct_in_folder
 from ..errors import InputError, OutputError, SettingsError
 from ..garbage import collect_rarely
+from ..masking import mask
+from ..read.remote import is_url
 from ..status import Change
 from ..write.head import FileHead, UpdateHead
 from .before import prepare_surveys, remove_earlier_points
@@ -75,8 +78,9 @@ def update_area(
             f"expected the clouds of {request.run} with --refine, which takes the points of both "
             "surveys, got none; restore them where run.json names them, or leave out --refine"
         )
+    refuse_same_clouds(request.clouds, earlier.clouds)
     settings = choose_read_settings(earlier.settings).replace(changes or {})
-    date = find_survey_date(request.clouds, request.date, earlier.date)
+    date = find_survey_date(request.clouds, request.date, earlier.date, earlier.clouds)
     request = dataclasses.replace(
         request, settings=settings, date=date, overrides=request.overrides or earlier.overrides
     )
@@ -101,6 +105,17 @@ def update_area(
         summary = reconstruct_in_folder(request, state, progress, steps)
         remove_earlier_points(state)
         return report_changes(request, state, summary)
+
+
+def refuse_same_clouds(clouds: tuple[str, ...], earlier: tuple[str, ...]) -> None:
+    """Raise InputError where a cloud is one of the `earlier` ones, whatever it holds now."""
+    known = {cloud if is_url(cloud) else os.path.realpath(cloud) for cloud in earlier}
+    for cloud in clouds:
+        if (cloud if is_url(cloud) else os.path.realpath(cloud)) in known:
+            raise InputError(
+                f"expected clouds of a new survey, got {mask(cloud)}, of which the run was made; "
+                "name others, and where a new survey replaced this file, move it to another folder"
+            )
 
 
 def report_changes(request: UpdateRequest, state: Path, summary: Summary) -> UpdateSummary:

@@ -309,7 +309,9 @@ class Updater:
         outline = Difference(
             ChangeKind.OUTLINE_CHANGED, math.nan, math.nan, job.area.area - before.area, apart
         )
-        places += record_places([outline])
+        is_first = apart.area > max((place["area"] for place in places), default=0.0)
+        redrawn = record_places([outline])
+        places = [*redrawn, *places] if is_first else [*places, *redrawn]
         return self.mark(
             result, dataclasses.replace(verdict, change=Change.CHANGED), places, member, lineage
         )
