@@ -5,15 +5,18 @@ import re
 import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from hiproof.city.request import Request
+from hiproof.city.run import reconstruct_area
 from hiproof.cli.app import app
 from hiproof.errors import OutputError
 from hiproof.write.files import atomic, hidden_name, scratch
-from tiny_town import make_town, write_town
+from tiny_town import make_town, write_footprints, write_town
 
 
 @pytest.fixture(scope="module")
@@ -94,6 +97,47 @@ def test_outputs_never_stand_for_inputs_or_files_of_a_run(command, town):
     assert isinstance(result.exception, OutputError), result.output
     assert re.search(RUN_COMMANDS[command], str(result.exception)), str(result.exception)
     assert read_all(town) == before and (town / "pipe").is_fifo()
+
+
+INPUT_COMMANDS = (
+    "convert RUN IN/buildings.gpkg",
+    "convert RUN/parameters.jsonl IN/buildings.gpkg",
+    "convert RUN CLOUD --format glb",
+    "report RUN --out IN/buildings.gpkg",
+    "build RUN/parameters.jsonl --out IN",
+    "enrich RUN --out IN",
+    "update RUN LATER --date 2024-05-01 --out IN",
+)
+
+
+@pytest.fixture(scope="module")
+def run_with_inputs(tmp_path_factory):
+    """A run and its cloud and footprints, which have the name of an output."""
+    folder = tmp_path_factory.mktemp("inputs")
+    (folder / "in").mkdir()
+    cloud, _ = write_town(folder, make_town(houses=1))
+    outlines = write_footprints(folder / "in" / "buildings.gpkg", make_town(houses=1).footprints)
+    reconstruct_area(Request((str(cloud),), folder / "run", str(outlines)))
+    return {
+        "RUN": folder / "run",
+        "IN": folder / "in",
+        "CLOUD": Path(cloud),
+        "LATER": Path(shutil.copy(cloud, folder / "later.laz")),
+    }
+
+
+@pytest.mark.parametrize("command", INPUT_COMMANDS)
+def test_outputs_never_stand_for_what_a_run_was_made_of(command, run_with_inputs):
+    words = [
+        str(run_with_inputs[first] / rest) if first in run_with_inputs else word
+        for word in command.split()
+        for first, _, rest in [word.partition("/")]
+    ]
+    before = read_all(run_with_inputs["RUN"].parent)
+    result = CliRunner().invoke(app, words)
+    assert isinstance(result.exception, OutputError), result.output
+    assert re.search("got .* for both", str(result.exception))
+    assert read_all(run_with_inputs["RUN"].parent) == before
 
 
 def test_a_second_conversion_replaces_the_first(town):

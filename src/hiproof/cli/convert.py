@@ -33,6 +33,7 @@ def convert(
 
     Exit code: 0 all models were converted, 2 damaged ones were left out, or unusable input.
     """
+    from ..evaluate.run import list_run_inputs
     from ..write.files import refuse_overwriting, refuse_run_file
 
     name = format.value if format else name_format(out)
@@ -42,7 +43,7 @@ def convert(
             f"expected --geoid-height with 3dtiles alone, got it with {name}; leave it out"
         )
     path = out or default_path(source, name)
-    refuse_overwriting([path], [source])
+    refuse_overwriting([path], [source, *list_run_inputs(source)])
     refuse_run_file(path)
     with show_progress("convert") as update:
         from ..write.files import elsewhere

@@ -29,13 +29,13 @@ def report(
     """
     with show_progress("measure"):
         from ..evaluate.report import write_report
-        from ..evaluate.run import evaluate_run
+        from ..evaluate.run import evaluate_run, list_run_inputs
         from ..read.models.damage import SkippedBuildings
         from ..update.before_after import draw_changes, evaluate_earlier
         from ..write.files import elsewhere, refuse_overwriting, refuse_run_file
 
         path, left_out = out or Path(folder) / "report.html", SkippedBuildings()
-        refuse_overwriting([path], [*(clouds or ()), footprints])
+        refuse_overwriting([path], [*(clouds or ()), footprints, *list_run_inputs(folder)])
         refuse_run_file(path)
         run = evaluate_run(
             folder, clouds or (), footprints, layer=layer, damaged=left_out, must_be_valid=True

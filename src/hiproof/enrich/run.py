@@ -23,7 +23,7 @@ from ..city.plan.checks import refuse_missing_use
 from ..city.work.cores import as_many_as_pay
 from ..city.work.executors import make_executor
 from ..errors import HiproofError, InputError, OutputError, report_error
-from ..evaluate.run import run_record
+from ..evaluate.run import list_run_inputs, run_record
 from ..formats import FORMATS, import_format, list_requested_files, requested_fragments
 from ..log import LOGGER
 from ..masking import masked_values
@@ -175,18 +175,24 @@ def enrich_run(
             f"expected a folder for enriched files, got {out}, which holds a run; choose another "
             "--out"
         )
-    waiting = make_waiting_folder(out, parameters, settings)
+    if not parameters.is_file():
+        raise InputError(
+            f"expected the output folder of `hiproof reconstruct`, got no {parameters}; check the "
+            "path"
+        )
     index = index_records(parameters)
     if len(index.offsets):
         refuse_missing_use(index.attributes, settings.use_attribute)
-    with atomic_file(waiting / "index.npz") as file:
-        np.savez(file, **index._asdict())
     records = Records(parameters, index)
     refuse_unfit(records, settings)
     requested = Settings(write=records.head.write, enrich=settings)
     refuse_other_citygml(requested)
     inputs = [parameters, settings.weather, settings.horizon, settings.shading_terrain]
-    refuse_overwriting(list_requested_files(requested, out).values(), inputs)
+    outputs = list_requested_files(requested, out).values()
+    refuse_overwriting(outputs, [*inputs, *list_run_inputs(parameters)])
+    waiting = make_waiting_folder(out, parameters, settings)
+    with atomic_file(waiting / "index.npz") as file:
+        np.savez(file, **index._asdict())
     total = len(records)
     blocks = list_blocks(waiting, total)
     missing = [block for block in blocks if not block[0].is_file()]
@@ -210,13 +216,7 @@ def enrich_run(
 
 def make_waiting_folder(out: Path, parameters: Path, settings: EnrichSettings) -> Path:
     """Make the hidden folder of the blocks of a request; those of others are removed."""
-    try:
-        state = parameters.stat()
-    except OSError as error:
-        raise InputError(
-            f"expected the output folder of `hiproof reconstruct`, got no {parameters}; check the "
-            "path"
-        ) from error
+    state = parameters.stat()
     request = [__version__, str(parameters), state.st_size, state.st_mtime_ns]
     request += [settings_mark(settings)]
     key = hashlib.sha256(json.dumps(request).encode()).hexdigest()[:16]

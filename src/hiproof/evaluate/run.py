@@ -174,6 +174,16 @@ def run_record(folder: Path) -> dict[str, Any]:
     return record
 
 
+def list_run_inputs(run: Path) -> list[str]:
+    """Return the files that a run was made of, by its folder or a file in it."""
+    try:
+        inputs = found_inputs(run_record(run if run.is_dir() else run.parent))
+    except InputError:
+        return []  # of another program, or damaged, which those who read it say
+    files = (*inputs.clouds, inputs.footprints, inputs.terrain, inputs.overrides)
+    return [file for file in files if file]
+
+
 def refuse_other_kinds(record: dict[str, Any]) -> None:
     """Raise InputError where a value of the record has another kind than RECORD."""
     for names, kind in RECORD.items():

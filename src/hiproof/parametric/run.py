@@ -21,8 +21,8 @@ import shapely
 
 from .. import __version__
 from ..errors import HiproofError, InputError, OutputError, is_interrupt
-from ..evaluate.run import run_record
-from ..formats import FORMATS, list_model_paths, list_requested_files
+from ..evaluate.run import list_run_inputs, run_record
+from ..formats import list_model_paths, list_requested_files
 from ..log import LOGGER
 from ..masking import mask, masked_values
 from ..model import Building
@@ -102,9 +102,10 @@ def build_file(
             f"expected a folder for what is built, got {out}, which holds a run of `hiproof "
             "reconstruct`; choose another --out"
         )
-    refuse_overwriting([out / FORMATS["parameters"].file], [path])
     with opened_parameters(path) as (head, records):
         settings = Settings(write=head.write).replace(changes or {})
+        outputs = list_requested_files(settings, out).values()
+        refuse_overwriting(outputs, [path, *list_run_inputs(path)])
         offset = head.offset if settings.write.out_crs == head.write.out_crs else None
         built.models = list_model_paths(settings, out)
         maker = Maker(dataclasses.replace(head, write=settings.write, offset=offset))

@@ -17,10 +17,13 @@ from ..city.plan.from_cloud import Progress
 from ..city.plan.work_plan import WorkPlan
 from ..city.run import Steps, Summary, extend_run_record, reconstruct_in_folder
 from ..errors import InputError, OutputError, SettingsError
+from ..evaluate.run import list_run_inputs
+from ..formats import list_requested_files
 from ..garbage import collect_rarely
 from ..masking import mask
 from ..read.remote import is_url
 from ..status import Change
+from ..write.files import refuse_overwriting
 from ..write.head import FileHead, UpdateHead
 from .before import prepare_surveys, remove_earlier_points
 from .change_tables import write_changes
@@ -85,6 +88,8 @@ def update_area(
         request, settings=settings, date=date, overrides=request.overrides or earlier.overrides
     )
     refuse_unusable(request)
+    outputs = list_requested_files(settings, Path(request.out)).values()
+    refuse_overwriting(outputs, list_run_inputs(Path(request.run)))
     state = open_state(request.out)
 
     def make_plan(_: Any, __: Progress) -> WorkPlan:
