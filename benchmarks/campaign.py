@@ -49,7 +49,6 @@ from hiproof.city.run import Request, reconstruct_area
 from hiproof.city.work import solve
 from hiproof.cli.check import check_file, count_bad
 from hiproof.compose import check_solid
-from hiproof.compose.solid import LENIENT_M
 from hiproof.parametric.building import build
 from hiproof.parametric.file import opened_parameters, read_parameters
 from hiproof.parametric.run import build_file
@@ -172,7 +171,7 @@ def judge_solid(name: str, record: dict, compose, result: Findings) -> None:
     except Exception as error:
         result.add(NOT_ALIKE, f"{name}, building {record['id']}: {error}")
         return
-    findings = check_solid(building.solid, planarity_m=max(LENIENT_M, compose.planarity_m))
+    findings = check_solid(building.solid, planarity_m=compose.planarity_m)
     if findings:
         result.add(INVALID, f"{name}, building {record['id']}: {findings[0].message}")
 

@@ -65,12 +65,10 @@ class CompositionError(HiproofError):
     The caller falls back to a simpler roof.
 
     `parts` are the numbers of the roof parts whose faces are at fault, empty where that is not
-    known. `places` are boxes in plan (low x, low y, high x, high y) [m] around what is at fault,
-    likewise.
+    known.
     """
 
     parts: tuple[int, ...] = ()
-    places: tuple[tuple[float, ...], ...] = ()
 
 
 def is_interrupt(error: BaseException) -> bool:

@@ -9,7 +9,6 @@ import shapely
 from hiproof.compose import check_solid, compose
 from hiproof.compose import solid as composing
 from hiproof.compose.check_faces import bent_faces
-from hiproof.compose.zones import ATTEMPTS, WHOLE_PLAN, Zone
 from hiproof.geometry.flat_shell import FlatShell
 from hiproof.model import Face, Solid
 from hiproof.settings import Settings
@@ -85,28 +84,9 @@ def test_few_roofs_need_coarser_snapping():
     first = 0
     for seed in range(100):
         problem = composing.plan_problem(generate_roof("unions", seed))
-        solid = composing.compose_at(problem, 0.0, options, [Zone(WHOLE_PLAN, 0)])
+        solid = composing.compose_at(problem, 0.0, options, 12.0, True)
         first += check_solid(solid, planarity_m=options.planarity_m) == ()
     assert first >= 97
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_flat_corners_turned_in_move_nothing_by_a_millimetre(kind):
-    """Turning in is for roofs that fail otherwise; of those that do not it changes no face and no
-    height to speak of.
-    """
-    options = Settings().compose
-    separate, turned_in = map(ATTEMPTS.index, ((1.0, False, False), (1.0, False, True)))
-    for seed in range(4):
-        problem = composing.plan_problem(generate_roof(kind, seed))
-        plain, turned = (
-            composing.compose_at(problem, -2.0, options, [Zone(WHOLE_PLAN, number)])
-            for number in (separate, turned_in)
-        )
-        assert [face.kind for face in plain.faces] == [face.kind for face in turned.faces]
-        if not check_solid(plain):
-            assert check_solid(turned) == ()
-        assert np.abs(plain.vertices - turned.vertices).max() < 2e-3
 
 
 def test_a_face_that_no_triangles_fill_is_bent_and_the_others_are_told_apart():

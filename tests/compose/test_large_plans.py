@@ -1,4 +1,4 @@
-"""Large plans: noding looks nearby only and comes to rest, and faults stay local."""
+"""Large plans: noding looks nearby only and comes to rest."""
 
 import math
 
@@ -9,11 +9,10 @@ import shapely
 from hiproof.compose import check_solid, compose
 from hiproof.compose.arrangement import is_beside, node
 from hiproof.compose.buckets import enter_edge, lay_buckets, list_near
-from hiproof.compose.zones import ATTEMPTS, WHOLE_PLAN, Zone, add_zones, list_reaches
 from hiproof.frames import LocalFrame
 from hiproof.model import Part, Piece, Roof
 
-REACHES = np.array([[-np.inf, -np.inf, np.inf, np.inf, 12.0]])
+REACH = 12.0
 
 
 def test_two_vertices_as_far_apart_as_the_reach_come_to_rest():
@@ -23,23 +22,21 @@ def test_two_vertices_as_far_apart_as_the_reach_come_to_rest():
         [408500, 799900, 299966, 799900],
         [299978, 799900, 299978, 700051],
     ]
-    xy, edges = node(np.array(segments), REACHES)
+    xy, edges = node(np.array(segments), REACH)
     pairs = {frozenset(map(tuple, xy[edge].tolist())) for edge in edges}
     assert frozenset([(299978, 799900), (299967, 700051)]) in pairs
     assert len(edges) == 4
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_noded_vertices_keep_the_reach_of_their_zone(seed):
+@pytest.mark.parametrize(("seed", "reach"), [(0, 12.0), (1, 12.0), (2, 300.0), (3, 300.0)])
+def test_noded_vertices_keep_the_reach(seed, reach):
     rng = np.random.default_rng(seed)
     starts = rng.integers(0, 100_000, (60, 2))
     segments = np.hstack([starts, starts + rng.integers(-20_000, 20_000, (60, 2))])
-    zone = [0.0, 0.0, 50_000.0, 100_000.0, 300.0]
-    xy, edges = node(segments, np.vstack([REACHES, [zone]]))
+    xy, edges = node(segments, reach)
     assert len(edges) > 60
     small_triangles = 0
     for v, place in enumerate(xy):
-        reach = 300.0 if zone[0] <= place[0] <= zone[2] and 0 <= place[1] <= zone[3] else 12.0
         for a, b in edges[(edges != v).all(axis=1)]:
             if is_beside(place, xy[a], xy[b], reach):
                 ends = np.linalg.norm(xy[[a, b]] - place, axis=1)
@@ -83,23 +80,3 @@ def test_any_number_of_crosswise_corners_is_mended():
     solid = compose(make_checkerboard(9), 0.0)
     assert not check_solid(solid)
     assert math.isclose(solid.volume, 4.0 * (41 * 4.0 + 40 * 7.0), rel_tol=1e-3)
-
-
-def test_each_zone_goes_on_from_the_attempts_made_there():
-    zones = (Zone(WHOLE_PLAN, 0),)
-    for number in (1, 2):
-        zones = add_zones(zones, [(0.0, 0.0, 1.0, 1.0)])
-        assert zones[-1].number == number
-    zones = add_zones(zones, [(10.0, 0.0, 11.0, 1.0), (1.2, 0.0, 1.3, 1.0)])
-    assert [zone.number for zone in zones] == [0, 1, 2, 1, 3]
-    reaches = list_reaches(zones, 0.001)
-    assert reaches[:, 4].tolist() == [12.0, 12.0, 32.0, 12.0, 102.0]
-    assert np.isinf(reaches[0, :4]).all() and reaches[1, 0] == -5000.0
-
-
-def test_no_zone_is_left_after_the_last_attempt():
-    zones = (Zone(WHOLE_PLAN, 0),)
-    for _ in ATTEMPTS[1:]:
-        zones = add_zones(zones, [WHOLE_PLAN])
-    assert len(zones) == len(ATTEMPTS)
-    assert add_zones(zones, [(0.0, 0.0, 1.0, 1.0)]) == ()

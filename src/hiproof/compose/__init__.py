@@ -7,11 +7,9 @@ simpler           parts given up one by one, where a roof cannot become a valid 
 readable          whether a file of parameters can hold a roof
 solid             `compose`: the steps below, one after the other; terrain intersection
 cells             outline, pieces and the lines where the active plane changes as one plan of cells
-zones             places where a solid failed, and what is attempted there
 arrangement       the planar arrangement under them, on an integer grid
 buckets           what lies near a place, for it
 levels            which heights meet over every vertex of the plan
-flat_corners      corners turned in where rounded heights would fold a face
 shell             roof, wall and ground faces that share them
 check             whether the result is valid by ISO 19107
 check_faces       its rules for each face by itself

@@ -56,30 +56,20 @@ def is_beside(p, a, b, reach):
 
 
 @compiled
-def find_reach(reaches, x, y):
-    """Return the reach at (x, y): that of the last zone (k, 5) that holds it."""
-    for k in range(len(reaches) - 1, 0, -1):
-        if reaches[k, 0] <= x <= reaches[k, 2] and reaches[k, 1] <= y <= reaches[k, 3]:
-            return reaches[k, 4]
-    return reaches[0, 4]
-
-
-@compiled
-def find_vertex_near_segment(xy, items, a, b, r, reaches):
+def find_vertex_near_segment(xy, items, a, b, reach):
     """Return the vertex of `items` beside segment ab nearest to a, else -1.
 
-    No reach is over `r`. The segment's ends do not count. Nor does a vertex that makes a small
-    triangle with them, in which an end lies beside the edge from the vertex to the other end: its
-    three edges would replace each other for ever.
+    The segment's ends do not count. Nor does a vertex that makes a small triangle with them, in
+    which an end lies beside the edge from the vertex to the other end: its three edges would
+    replace each other for ever.
     """
-    x_low, x_high = min(xy[a, 0], xy[b, 0]) - r, max(xy[a, 0], xy[b, 0]) + r
-    y_low, y_high = min(xy[a, 1], xy[b, 1]) - r, max(xy[a, 1], xy[b, 1]) + r
+    x_low, x_high = min(xy[a, 0], xy[b, 0]) - reach, max(xy[a, 0], xy[b, 0]) + reach
+    y_low, y_high = min(xy[a, 1], xy[b, 1]) - reach, max(xy[a, 1], xy[b, 1]) + reach
     best, best_along = -1, np.int64(0)
     for v in items:
         x, y = xy[v, 0], xy[v, 1]
         if x < x_low or x > x_high or y < y_low or y > y_high or v in (a, b):
             continue
-        reach = find_reach(reaches, x, y)
         if not is_beside(xy[v], xy[a], xy[b], reach):
             continue
         along = (xy[b, 0] - xy[a, 0]) * (x - xy[a, 0]) + (xy[b, 1] - xy[a, 1]) * (y - xy[a, 1])
@@ -132,12 +122,12 @@ def crossing_point(a, b, c, d):
 
 
 @compiled
-def number_ends(segments, reaches, r):
-    """Number the end points of the segments as vertices. No reach is over `r`.
+def number_ends(segments, reach):
+    """Number the end points of the segments as vertices.
 
     Returns xy with room to grow, their number, the ends (m, 2), and buckets of the vertices.
     """
-    size = len(segments)
+    size, r = len(segments), np.int64(reach) + 1
     xy, count = np.empty((2 * size + 16, 2), np.int64), 0
     ends, items = np.empty((size, 2), np.int64), np.empty(0, np.int64)
     buckets = lay_buckets(segments.reshape(-1, 2), size)
@@ -145,7 +135,7 @@ def number_ends(segments, reaches, r):
         for end in range(2):
             x, y = segments[s, 2 * end], segments[s, 2 * end + 1]
             items, n_items = list_near(x - r, y - r, x + r, y + r, buckets, items)
-            v = find_vertex_at(xy, items[:n_items], x, y, find_reach(reaches, x, y))
+            v = find_vertex_at(xy, items[:n_items], x, y, reach)
             if v < 0:
                 v, xy[count, 0], xy[count, 1] = count, x, y
                 buckets = enter_item(v, x, y, x, y, buckets)
@@ -165,20 +155,17 @@ def has_edge(edges, items, a, b):
 
 
 @compiled
-def node(segments, reaches):
+def node(segments, reach):
     """Return the vertices (n, 2) and edges (e, 2) of an arrangement.
 
-    It is that of `segments` (m, 4), well separated by the reach (grid units) of
-    the last of the zones `reaches` (k, 5) that holds a vertex, the first of which is everywhere.
+    It is that of `segments` (m, 4), well separated by the `reach` (grid units).
 
     Earlier segments have the right of way: their end points stay, later ones within reach move onto
     them. Returns no edges if it does not come to rest (never seen; the bound keeps a broken input
     from hanging a run).
     """
-    r = np.int64(0)
-    for k in range(len(reaches)):
-        r = max(r, np.int64(reaches[k, 4]) + 1)
-    xy, count, ends, places = number_ends(segments, reaches, r)
+    r = np.int64(reach) + 1
+    xy, count, ends, places = number_ends(segments, reach)
     stack, top = ends[::-1].copy(), len(ends)  # the first on top
     edges, edge_count = np.empty((2 * len(segments) + 16, 2), np.int64), 0
     borders, items = lay_buckets(xy[:count], len(segments)), np.empty(0, np.int64)
@@ -196,7 +183,7 @@ def node(segments, reaches):
         x_low, x_high = min(xy[a, 0], xy[b, 0]), max(xy[a, 0], xy[b, 0])
         y_low, y_high = min(xy[a, 1], xy[b, 1]), max(xy[a, 1], xy[b, 1])
         items, n_items = list_near(x_low - r, y_low - r, x_high + r, y_high + r, places, items)
-        v = find_vertex_near_segment(xy, items[:n_items], a, b, r, reaches)
+        v = find_vertex_near_segment(xy, items[:n_items], a, b, reach)
         if v >= 0:
             stack, top = append_row(stack, top, v, b)
             stack, top = append_row(stack, top, a, v)
@@ -214,7 +201,6 @@ def node(segments, reaches):
         places = enter_item(count - 1, x, y, x, y, places)
         stack, top = append_row(stack, top, a, b)
         items, n_items = list_near(x - r, y - r, x + r, y + r, borders, items)
-        reach = find_reach(reaches, x, y)
         top = take_back(xy, count - 1, e, edges, items[:n_items], stack, top, reach)
     live = 0
     for e in range(edge_count):
@@ -681,7 +667,7 @@ def dissolve(xy, edges, side):
 @compiled
 def plan_cells(
     segments,
-    reaches,
+    reach,
     soup,
     soup_start,
     planes,
@@ -700,7 +686,7 @@ def plan_cells(
     `planes` give grid units from grid units. Cells too small are merged away, also uncovered ones;
     what remains UNCOVERED is for the caller to see in `side`.
     """
-    xy, edges = node(segments, reaches)
+    xy, edges = node(segments, reach)
     order, start = half_edge_order(xy, edges)
     face, area = trace_faces(xy, edges, next_half_edges(edges, order, start))
     points = face_points(xy, edges, face, len(area))

@@ -18,7 +18,6 @@ from .arrangement import (
     GRID_M,
     OUTSIDE,
     UNCOVERED,
-    find_reach,
     half_edge_order,
     is_beside,
     meeting_lines,
@@ -80,7 +79,7 @@ def is_clear(xy, edges, missing, stays, distant, reach):
 
 
 @compiled
-def without_short_edges(xy, edges, side, planes, reaches):
+def without_short_edges(xy, edges, side, planes, reach):
     """Drop an end of every edge between two cells that is shorter than 3 mm.
 
     Returns (xy, edges, side), compacted.
@@ -105,14 +104,7 @@ def without_short_edges(xy, edges, side, planes, reaches):
             if (
                 count != 2
                 or distant == stays
-                or not is_clear(
-                    xy,
-                    edges,
-                    missing,
-                    stays,
-                    distant,
-                    find_reach(reaches, xy[missing, 0], xy[missing, 1]),
-                )
+                or not is_clear(xy, edges, missing, stays, distant, reach)
             ):
                 continue
             edges[other, end] = stays
@@ -241,9 +233,9 @@ def stacked_soups(soups: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def arrange(
-    problem: PlanProblem, reaches: np.ndarray, min_area_m2: float, min_width_m: float
+    problem: PlanProblem, reach: float, min_area_m2: float, min_width_m: float
 ) -> PlanCells:
-    """Return the plan cells of a roof, well separated by the `reaches` of zones.
+    """Return the plan cells of a roof, well separated by the `reach` (grid units).
 
     Where no piece covers the outline, the piece beside it is extended.
     """
@@ -255,7 +247,7 @@ def arrange(
         segments = np.concatenate((soup.astype(np.int64), patches.astype(np.int64), lines))
         xy, edges, side = plan_cells(
             segments,
-            reaches,
+            reach,
             soup,
             soup_start,
             problem.planes,
@@ -268,7 +260,7 @@ def arrange(
             min_width_m / GRID_M,
         )
         if not (side == UNCOVERED).any():
-            return PlanCells(*without_short_edges(xy, edges, side, problem.planes, reaches))
+            return PlanCells(*without_short_edges(xy, edges, side, problem.planes, reach))
         problem = extend_over_gaps(problem, PlanCells(xy, edges, side))
     raise CompositionError(
         "expected the roof's pieces to reach all of its outline, got gaps that no piece borders"

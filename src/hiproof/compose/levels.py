@@ -9,7 +9,7 @@ import numpy as np
 
 from ..compiled import compiled
 from ..geometry.arrays import copy_row, copy_rows, sort_order
-from .arrangement import OUTSIDE, find_reach, half_edge_order, next_half_edges, trace_faces
+from .arrangement import OUTSIDE, half_edge_order, next_half_edges, trace_faces
 
 # levels closer than this become one: points within 1 mm are one by ISO 19107 as checked
 LEVEL_GAP_M = 1.1e-3
@@ -72,7 +72,7 @@ def crossing_place(xy, edges, side, planes, e, x, y, reach):
 
 
 @compiled
-def split_at_crossings(xy, edges, side, planes, reaches):
+def split_at_crossings(xy, edges, side, planes, reach):
     """Split every edge over which the two cells' heights swap order.
 
     Returns (xy, edges, side, ties (k, 3)).
@@ -100,7 +100,6 @@ def split_at_crossings(xy, edges, side, planes, reaches):
             continue
         t = at_a / (at_a - at_b)
         length = np.hypot(float(b[0] - a[0]), float(b[1] - a[1]))
-        reach = find_reach(reaches, a[0], a[1])
         if t * length < reach or (1 - t) * length < reach:
             v = edges[e, 0] if t < 0.5 else edges[e, 1]
             z0 = evaluate_plane(planes, left, xy[v, 0], xy[v, 1])

@@ -6,7 +6,6 @@ It has roof faces over the cells, walls where levels part, and one ground face b
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple, TypeVar
@@ -15,11 +14,9 @@ import numpy as np
 
 from ..errors import CompositionError
 from ..model import GROUND, ROOF, WALL, Face, Solid
-from .arrangement import COLLINEAR_UNITS, GRID_M, OUTSIDE, find_reach
+from .arrangement import COLLINEAR_UNITS, GRID_M, OUTSIDE
 from .cells import PlanCells, PlanProblem
-from .flat_corners import turn_flat_corners_in
 from .levels import find_saddles, split_at_crossings, stack_levels
-from .zones import Zone, frame_places, select_turned_in
 
 Item = TypeVar("Item")
 
@@ -42,14 +39,12 @@ class Saddles(Exception):
 
     Levels rise and fall twice around each, or a cell meets itself there.
 
-    `patches` (soup, label) are the cures, and `places` boxes around the cells at each vertex [m].
+    `patches` (soup, label) are the cures.
     """
 
-    def __init__(
-        self, patches: list[tuple[np.ndarray, int]], places: tuple[tuple[float, ...], ...]
-    ):
+    def __init__(self, patches: list[tuple[np.ndarray, int]]):
         super().__init__("the roof's levels form a checkerboard around a vertex")
-        self.patches, self.places = patches, places
+        self.patches = patches
 
 
 def raise_shell(
@@ -57,25 +52,20 @@ def raise_shell(
     problem: PlanProblem,
     z_ground: float,
     clearance_m: float,
-    zones: Sequence[Zone],
-    reaches: np.ndarray,
+    merges_walls: bool,
+    reach: float,
     widening: float,
 ) -> Solid:
     """Raise the solid over the plan cells.
 
-    Raises Saddles where the problem needs a patch first, CompositionError with the places where
-    none helps.
+    Raises Saddles where the problem needs a patch first, CompositionError where none helps.
 
     The ground is lowered where needed to stay `clearance_m` under the lowest roof vertex.
-    Consecutive walls along a straight stretch of the outline become one where all `zones` want it.
-    Flat corners are turned in where zones do. `reaches` (k, 5) are the zones'. Patches are wider by
-    the factor `widening`.
+    With `merges_walls`, consecutive walls along a straight stretch of the outline become one.
+    Vertices keep the `reach` (grid units). Patches are wider by the factor `widening`.
     """
     planes = problem.planes
-    xy, edges, side, ties = split_at_crossings(cells.xy, cells.edges, cells.side, planes, reaches)
-    may_turn = select_turned_in(zones, xy)
-    if may_turn.any():
-        xy = turn_flat_corners_in(xy, edges, side, ties, reaches, may_turn)
+    xy, edges, side, ties = split_at_crossings(cells.xy, cells.edges, cells.side, planes, reach)
     if len(edges) == 0:
         raise CompositionError(
             "expected an outline with an area, got one thinner than a millimetre; repair or remove "
@@ -86,17 +76,15 @@ def raise_shell(
     levels = Levels(*stack_levels(xy, edges, side, planes, z_base, ties))
     saddles = find_saddles(levels.order, levels.start, levels.level, levels.face, side.ravel())
     if saddles.any():
+        radius = max(SETBACK_M / GRID_M, 4 * reach) * widening
         vertices = np.flatnonzero(saddles).tolist()
-        places = [sectors_at(v, xy, edges, side, levels) for v in vertices]
-        boxes = [frame_sectors(place, xy, edges, levels) for place in places]
-        raise Saddles(mend_corners(places, boxes, reaches, widening), tuple(boxes))
+        raise Saddles([cure(sectors_at(v, xy, edges, side, levels), radius) for v in vertices])
     # from here on numbers of a few dozen edges: plain lists are faster than arrays
     label, xyz = side.ravel().tolist(), levels.vertices.tolist()
     follow, face, level = levels.follow.tolist(), levels.face.tolist(), levels.level.tolist()
     faces = roof_faces(follow, face, level, label, xyz, problem.part)
     rises = wall_rises(follow, level)
-    is_merged = all(zone.attempt.merges_walls for zone in zones)
-    runs = wall_runs(rises, follow, label, xyz) if is_merged else [[h] for h in rises]
+    runs = wall_runs(rises, follow, label, xyz) if merges_walls else [[h] for h in rises]
     skip = {rises[h][0] for run in runs for h in run[1:]}
     faces += [
         Face((tuple([v for v in make_wall_ring(run, rises) if v not in skip]),), WALL)
@@ -348,46 +336,11 @@ def sectors_at(
     )
 
 
-def frame_sectors(
-    sectors: Sectors, xy: np.ndarray, edges: np.ndarray, levels: Levels
-) -> tuple[float, ...]:
-    """Return the box in plan [m] around the cells that meet at a plan vertex."""
-    roofed = [f for f, label in zip(sectors.face, sectors.label, strict=True) if label != OUTSIDE]
-    half_edges = np.flatnonzero(np.isin(levels.face, roofed))
-    return frame_places(xy[edges[half_edges >> 1]].reshape(-1, 2) * GRID_M)
-
-
-def mend_corners(
-    places: list[Sectors],
-    boxes: list[tuple[float, ...]],
-    reaches: np.ndarray,
-    widening: float,
-) -> list[tuple[np.ndarray, int]]:
-    """Return a patch for each vertex that is no manifold.
-
-    Raises CompositionError with the boxes of those that no patch mends.
-    """
-    patches, failures = [], []
-    for sectors, box in zip(places, boxes, strict=True):
-        reach = find_reach(reaches, *map(int, sectors.corner))
-        patch = cure(sectors, max(SETBACK_M / GRID_M, 4 * reach) * widening)
-        if patch is None:
-            failures.append(box)
-        else:
-            patches.append(patch)
-    if failures:
-        failure = CompositionError(
-            "expected levels that can be told apart around every corner, got a corner that has none"
-        )
-        failure.places = tuple(failures)
-        raise failure
-    return patches
-
-
-def cure(sectors: Sectors, radius: float) -> tuple[np.ndarray, int] | None:
+def cure(sectors: Sectors, radius: float) -> tuple[np.ndarray, int]:
     """Return a patch (soup, label) for a vertex that is no manifold.
 
-    Returns None if none mends it. It gives the tip of the narrowest peak to the higher neighbour.
+    It gives the tip of the narrowest peak to the higher neighbour. Raises CompositionError if none
+    mends it.
 
     Where no levels cross but a cell meets itself, the tip of what lies between its two arms goes to
     that cell.
@@ -402,7 +355,9 @@ def cure(sectors: Sectors, radius: float) -> tuple[np.ndarray, int] | None:
     if len(peaks) < 2:
         peaks = pinches(sectors)
     if not peaks:
-        return None
+        raise CompositionError(
+            "expected levels that can be told apart around every corner, got a corner that has none"
+        )
     _, run, label = min(peaks)
     return sectors.tip(run, radius), label
 
