@@ -66,6 +66,7 @@ def test_the_help_holds_every_word_of_its_texts(name):
     shown = "".join(invoke(name, flag, env={"COLUMNS": "80"}).output.split())
     command = COMMAND_LINE[name]
     texts = [command.help, *(param.help for param in command.params)]
+    assert all(texts)
     assert [text for text in texts if "".join(text.split()) not in shown] == []
 
 

@@ -45,14 +45,6 @@ WITH_EXAMPLES = sorted(
 EXTRAS = {"torch", "distributed", "dask", "matplotlib", "psycopg", "onnx"}
 
 
-@pytest.mark.parametrize("name", sorted(COMMANDS))
-def test_every_command_and_option_is_explained(name):
-    command = COMMANDS[name]
-    assert command.help
-    for parameter in command.params:
-        assert getattr(parameter, "help", None), parameter.name
-
-
 def test_the_page_of_roof_types_names_every_one():
     text = (ROOT / "docs/primitives.md").read_text()
     assert [name for name in CATALOGUE if f"\n## {name}\n" not in text] == []

@@ -4,7 +4,6 @@ import dataclasses
 
 import pytest
 
-from hiproof.errors import SettingsError
 from hiproof.settings import Settings
 
 ALL = [
@@ -37,33 +36,3 @@ def test_toml_explains_every_setting():
     for section, declared in ALL:
         assert f"[{section}]" in text
         assert declared.metadata["help"] in text
-
-
-@pytest.mark.parametrize(
-    ("values", "expected"),
-    [
-        ({"fitt": {}}, "fitt"),
-        ({"fit": {"objektive": "paper"}}, "objektive"),
-        ({"fit": {"objective": "pretty"}}, "likelihood, paper"),
-        ({"compose": {"snap_m": 5.0}}, "between"),
-        ({"compose": {"snap_m": "wide"}}, "compose.snap_m"),
-        ({"compose": {"snap_m": float("nan")}}, "between"),
-        ({"read": 3}, "got read = 3;"),
-    ],
-)
-def test_a_wrong_setting_gets_a_sentence(values, expected):
-    with pytest.raises(SettingsError, match=expected):
-        Settings.from_dict(values)
-
-
-@pytest.mark.parametrize("text", ["fit = [", "\x00"])
-def test_a_broken_toml_file_gets_a_sentence(tmp_path, text):
-    path = tmp_path / "broken.toml"
-    path.write_text(text)
-    with pytest.raises(SettingsError, match="hiproof settings"):
-        Settings.from_toml(path)
-
-
-def test_a_missing_toml_file_gets_a_sentence(tmp_path):
-    with pytest.raises(SettingsError, match="missing"):
-        Settings.from_toml(tmp_path / "missing.toml")
