@@ -16,7 +16,7 @@ import shapely
 from ...model import Part
 from ...primitives.catalogue import CURVED, ROUND
 from ...settings import Settings
-from .accept import PartsRoof, accept, accept_all, make_parts_roof
+from .accept import CIRCLE_NUMBERS, PartsRoof, accept, accept_all, make_parts_roof
 from .arcs import find_arcs
 from .barrels import list_barrels
 from .drums import list_arc_drums, list_drums
@@ -42,13 +42,16 @@ def list_part_shapes(
     roof: PartsRoof, asked: list[Part], names: list[str], settings: Settings
 ) -> Iterator[tuple[Part, int]]:
     """Yield shapes that may take the place of each part in `asked` and those around it."""
-    rounds = [name for name in names if name in ROUND]
+    everywhere = np.arange(len(roof.points))
+    is_worth_disc = roof.is_worth(everywhere, 0.0, CIRCLE_NUMBERS)
+    rounds = [name for name in names if name in ROUND and is_worth_disc]
     for part in asked:
         own = roof.find_seen([part])
         if len(own) < FEWEST_CURVE_POINTS:
             continue
-        if "flat" in names:
+        if "flat" in names and is_worth_disc:
             yield from list_drums(roof, part, own)
         if "barrel" in names:
             yield from list_barrels(roof, part, settings)
-        yield from list_top_shapes(roof, part, own, rounds)
+        if rounds:
+            yield from list_top_shapes(roof, part, own, rounds)

@@ -43,7 +43,7 @@ def list_drums(roof: PartsRoof, part: Part, own: np.ndarray) -> Iterator[tuple[P
         for other in select_touching(roof.parts, unite_outlines([part]))
         if other.type == "flat" and abs(other.translation[2] - level) <= SAME_LEVEL_M
     ]
-    for start in (own, roof.find_seen(group)):
+    for start in (own, roof.find_seen(group)) if len(group) > 1 else (own,):
         circle, right_share = find_circle(roof, level, start)
         drum = make_drum(circle[:2], float(circle[2]), level)
         if right_share > 0.0 and shapely.covers(roof.outline, drum.outlines[0]):

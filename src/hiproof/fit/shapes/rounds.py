@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
+from ...compiled import compiled
 from ...geometry.arrays import compute_median
 from ...geometry.rings import OVERLAY_GRID_M
 from ...model import Part
@@ -46,7 +47,9 @@ ROUND_SHAPES = {
 RADII = (0.6, 0.9, 1.35, 2.0, 3.0)  # Of discs around a top, in radii of its part's area.
 LEAST_FALL_M = 0.3  # Least fall (m) from the top: less is a level roof.
 FEWEST_POINTS = 6  # A slope and a height, and as many points again to check them.
+MOST_ASKED = 200  # Most points of a disc that say whether it is round: of more, every k-th does.
 CENTRE_ROUNDS = 3  # Rounds in which the middle of a disc is found.
+LEAST_RISE_M = 0.01  # A point of a disc rises at least so far (m) above its mean.
 RIDGE = 1e-6  # It keeps what no point determines.
 GROWTH = 3.0  # A shape reaches out to so many times the radius with which it begins at most.
 GROWTH_ROUNDS = 2  # Rounds in which a shape is fitted to all points that follow it.
@@ -89,10 +92,11 @@ def list_top_shapes(
     disc = own[:0]
     for radius in (share * wide for share in RADII):
         last = disc
-        centre, disc = find_centre(roof, start, radius)
+        centre, disc = find_disc(roof.points, start, radius)
         if np.array_equal(disc, last) or not roof.is_worth(disc, 0.0, CIRCLE_NUMBERS):
             continue
-        misfit = roof.price_gaps(measure_round_gaps(roof.points[disc], centre)).sum()
+        some = disc[:: 1 + len(disc) // MOST_ASKED]
+        misfit = roof.price_gaps(measure_round_gaps(roof.points[some], centre)).mean() * len(disc)
         # The facets of a spire are named so, and lie as near. A house may have one cant.
         misfit *= len(list_cants(part.parameters)) < 2
         if not roof.is_worth(disc, misfit, CIRCLE_NUMBERS):
@@ -112,22 +116,28 @@ def list_top_shapes(
         names = [name for name in names if HALF_WIDTH in ROUND_SHAPES[name].free]
 
 
-def find_centre(
-    roof: PartsRoof, centre: np.ndarray, radius: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the middle (2,) of what rises above the rest of a disc of points, and these (k,).
+@compiled
+def find_disc(points, start, radius):
+    """Return the middle (2,) of what rises above the rest of a disc of points (n, 3), and which.
 
-    It begins with the disc around a `centre`.
+    It begins with the disc around `start` (2,). Points ascend by x. They are given by number (k,).
     """
-    disc = roof.find_near(centre, radius)
-    for _ in range(CENTRE_ROUNDS):
-        if not len(disc):
+    x, y, disc, count = start[0], start[1], np.empty(len(points), np.int64), 0
+    for turn in range(CENTRE_ROUNDS + 1):
+        if turn > 0:
+            level, total, u, v = points[disc[:count], 2].mean(), 0.0, 0.0, 0.0
+            for i in disc[:count]:
+                rise = max(points[i, 2] - level, LEAST_RISE_M)
+                total, u, v = total + rise, u + rise * points[i, 0], v + rise * points[i, 1]
+            x, y = u / total, v / total
+        first = np.searchsorted(points[:, 0], x - radius)
+        last, count = np.searchsorted(points[:, 0], x + radius), 0
+        for i in range(first, last):  # a number that does not count is overwritten by the next
+            disc[count] = i
+            count += (points[i, 0] - x) ** 2 + (points[i, 1] - y) ** 2 <= radius**2
+        if count == 0:
             break
-        x, y, z = roof.points[disc].T
-        above = np.maximum(z - z.mean(), 0.01)
-        centre = np.array([above @ x, above @ y]) / above.sum()
-        disc = roof.find_near(centre, radius)
-    return centre, disc
+    return np.array([x, y]), disc[:count]
 
 
 def measure_round_gaps(points: np.ndarray, centre: np.ndarray) -> np.ndarray:
