@@ -453,15 +453,15 @@ def compute_heights(roof, view, x, y, reach, heights, volumes):
     Each step is taken for all places at once, so that a processor takes it for several together.
     """
     heights[:], volumes[:] = -np.inf, -1
-    room = np.empty(len(x))
+    room, ascends = np.empty(len(x)), True
+    for i in range(1, len(x)):
+        ascends &= x[i - 1] <= x[i]
     for m in range(len(view)):
         k, first, last = view[m], 0, len(x)
         x0, x1 = roof.boxes[k, 0] - reach, roof.boxes[k, 1] + reach
         y0, y1 = roof.boxes[k, 2] - reach, roof.boxes[k, 3] + reach
-        while first < last and x[first] < x0:
-            first += 1
-        while first < last and x[last - 1] > x1:
-            last -= 1
+        if ascends:
+            first, last = np.searchsorted(x, x0), np.searchsorted(x, x1, "right")
         u, v, z = x[first:last], y[first:last], room[first:last]
         z[:] = np.inf
         for p in range(roof.n_planes[k]):
