@@ -9,6 +9,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import shapely
+
 from ..log import count_things
 from ..status import Change, Grade, Status
 from ..status import Doubt as Remark
@@ -42,63 +44,26 @@ def measure_doubt(record: Mapping[str, Any]) -> BuildingDoubt:
     ...     "residuals": {"share_within_20cm": 0.6}})
     BuildingDoubt(amount=1.4, reasons=('poor',))
     """
-    result = [
-        score_change(record),
-        score_residuals(record),
-        unsure_grade(record),
-        unsure_status(record),
-        score_remarks(record),
-        score_unexplained(record),
-    ]
-    result += [loose_parts(record), close_call(record)]
-    scores = [pair for pair in result if pair is not None]
+    detail, grade = record.get("detail") or "", record.get("quality")
+    share = (record.get("residuals") or {}).get("share_within_20cm")
+    status = {status.code: status.value for status in UNSURE}.get(record.get("status", ""))
+    remarks = ", ".join(remark.told for remark in Remark if remark.value in detail)
+    scores: list[tuple[float, str]] = []
+    if (record.get("change") or {}).get("class") == Change.UNCERTAIN.code:
+        scores.append((UNCERTAIN_CHANGE, "uncertain change"))
+    if share is not None:  # buildings that fit well are sorted by it, too
+        scores.append((1.0 - share, ""))
+    if grade in UNSURE_GRADES:  # the detail says why
+        scores.append((UNSURE_GRADES[grade], grade))
+    if status is not None:
+        scores.append((0.5, status.removeprefix("no model: ").split(":")[0].split(",")[0]))
+    if remarks:
+        scores.append((REMARKED, remarks))
+    scores += filter(None, [score_unexplained(record), loose_parts(record), close_call(record)])
     return BuildingDoubt(
         round(sum(amount for amount, _ in scores), 4),
         tuple(reason for _, reason in scores if reason),
     )
-
-
-def score_change(record: Mapping[str, Any]) -> tuple[float, str] | None:
-    """Score a change that an update left uncertain; it comes before all other doubts."""
-    is_uncertain = (record.get("change") or {}).get("class") == Change.UNCERTAIN.code
-    return (UNCERTAIN_CHANGE, "uncertain change") if is_uncertain else None
-
-
-def score_residuals(record: Mapping[str, Any]) -> tuple[float, str] | None:
-    """Score points away from the roof.
-
-    Buildings that fit well are still sorted by it.
-    """
-    share = (record.get("residuals") or {}).get("share_within_20cm")
-    if share is None:
-        return None
-    return 1.0 - share, ""
-
-
-def unsure_grade(record: Mapping[str, Any]) -> tuple[float, str] | None:
-    """Score a verdict that is not good; the detail says why."""
-    grade = record.get("quality")
-    return (UNSURE_GRADES[grade], grade) if grade in UNSURE_GRADES else None
-
-
-def unsure_status(record: Mapping[str, Any]) -> tuple[float, str] | None:
-    """Score an outcome that the run itself calls doubtful."""
-    unsure = {status.code: status for status in UNSURE}
-    status = unsure.get(record.get("status", ""))
-    return (
-        None
-        if status is None
-        else (0.5, status.value.removeprefix("no model: ").split(":")[0].split(",")[0])
-    )
-
-
-def score_remarks(record: Mapping[str, Any]) -> tuple[float, str] | None:
-    """Score the remarks in the detail.
-
-    They are of two surfaces, places without points, an assumed ground, and others.
-    """
-    phrases = [remark.told for remark in Remark if remark.value in (record.get("detail") or "")]
-    return (REMARKED, ", ".join(phrases)) if phrases else None
 
 
 def score_unexplained(record: Mapping[str, Any]) -> tuple[float, str] | None:
@@ -106,7 +71,7 @@ def score_unexplained(record: Mapping[str, Any]) -> tuple[float, str] | None:
     area, rings = record.get("unexplained_area_m2"), record.get("outline")
     if not area or not rings:
         return None
-    share = min(area / max(ring_area(rings[0]), 1.0), 1.0)
+    share = min(area / max(shapely.Polygon(rings[0]).area, 1.0), 1.0)
     is_large = area >= LARGE_M2 and share >= LARGE_SHARE
     return share, f"{area:.0f} m² unexplained" if is_large else ""
 
@@ -138,9 +103,3 @@ def close_call(record: Mapping[str, Any]) -> tuple[float, str] | None:
     if len(ranked) < 2 or ranked[0][0] - ranked[1][0] >= CLOSE_CALL:
         return None
     return 0.2, f"{ranked[0][1]} or {ranked[1][1]}"
-
-
-def ring_area(ring: list) -> float:
-    """Return the area (m2) of a ring of [x, y]."""
-    turned = zip(ring, ring[1:] + ring[:1], strict=True)
-    return abs(sum(x0 * y1 - x1 * y0 for (x0, y0), (x1, y1) in turned)) / 2

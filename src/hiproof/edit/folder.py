@@ -55,7 +55,7 @@ class RunFolder:
         if stamp == self.stamp:
             return
         self.head, rows = read_rows(self.path)
-        self.settings = read_settings(self.folder, self.head)
+        self.settings = replace(Settings(), compose=self.head.compose)
         self.rows = sorted(rows, key=lambda row: -row.doubt.amount)
         self.by_id, self.stamp = {row.id: row for row in rows}, stamp
 
@@ -83,14 +83,6 @@ class RunFolder:
                 f"expected {self.path} as it was, got another file; start `hiproof edit` again"
             )
         return record
-
-
-def read_settings(folder: Path, head: FileHead) -> Settings:
-    """Return the settings of the run, as far as its files have them.
-
-    They are how it composed its solids and what it called poor.
-    """
-    return replace(Settings(), compose=head.compose)
 
 
 def read_rows(path: Path) -> tuple[FileHead, list[BuildingRow]]:

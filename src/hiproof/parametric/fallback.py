@@ -15,7 +15,6 @@ import numpy as np
 import shapely
 
 from ..errors import CompositionError, SettingsError
-from ..frames import LocalFrame
 from ..model import Building
 from ..read.numbers import read_number
 from ..settings import ReadSettings, Settings
@@ -25,7 +24,7 @@ from ..stages.remarks import add_remark
 from ..status import Doubt, Status
 from ..write.parameters import outline_record
 from .building import build
-from .override import RANGES, Override
+from .override import RANGES, Override, choose_frame, describe_block
 
 ABOVE_GROUND = "+"  # before a column: its heights count from the ground
 WITHOUT_POINTS = (Status.NO_POINTS, Status.NO_ROOF)
@@ -132,8 +131,7 @@ def build_block(
     """
     shift = np.array(building.shift)
     outline = shapely.transform(largest_polygon(building.footprint), lambda xy: xy + shift)
-    corners = shapely.get_coordinates(outline)
-    frame = LocalFrame.around(np.column_stack([corners, np.zeros(len(corners))]))
+    frame = choose_frame(np.zeros((0, 3)), outline)
     local = to_local(outline, frame)
     ground = find_ground(local, np.zeros((1, 3)), frame, terrain)
     if ground.source.startswith("assumed"):
@@ -146,13 +144,6 @@ def build_block(
             return add_remark(building, "its height is known, but not that of its ground")
     top = ground.z + heights.block_m if heights.block_m is not None else heights.roof_m
     rings = outline_record(local)
-    part = {
-        "type": "flat",
-        "parameters": {},
-        "position": [0.0, 0.0, top - frame.origin[2]],
-        "rotation": 0.0,
-        "outlines": [rings],
-    }
     created = build(
         {
             "id": building.id,
@@ -161,7 +152,7 @@ def build_block(
             "outline": rings,
             "z_ground": ground.z,
             "ground_source": ground.source,
-            "parts": [part],
+            "parts": [describe_block(rings, top - frame.origin[2])],
         },
         settings.compose,
     )

@@ -336,16 +336,7 @@ def build_given(
     ground = choose_ground(override, area, local, frame, terrain, walls)
     parts = override.parts
     if parts is None and override.block_height is not None:
-        level = [0.0, 0.0, ground.z + override.block_height - frame.origin[2]]
-        parts = [
-            {
-                "type": "flat",
-                "parameters": {},
-                "position": level,
-                "rotation": 0.0,
-                "outlines": [rings],
-            }
-        ]
+        parts = [describe_block(rings, ground.z + override.block_height - frame.origin[2])]
     place = {
         "origin": frame.origin.tolist(),
         "outline": rings,
@@ -369,6 +360,13 @@ def build_given(
     created = open_passages(created, ground, given)
     created = add_installations(created, local, settings)
     return add_remark(created, of_footprint)
+
+
+def describe_block(rings: Any, z_local: float) -> dict[str, Any]:
+    """Return the object of a level part over the outline `rings`."""
+    position = [0.0, 0.0, z_local]
+    rows = {"type": "flat", "parameters": {}, "position": position, "rotation": 0.0}
+    return rows | {"outlines": [rings]}
 
 
 def choose_frame(points: np.ndarray, outline: shapely.Polygon | None) -> LocalFrame:
