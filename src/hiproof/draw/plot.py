@@ -37,7 +37,9 @@ def plot(building: Building, points: np.ndarray | None = None, ax: Any = None) -
         shade_colour(c, lightness(model.solid, f))
         for c, f in zip(list_colours(building), faces, strict=True)
     ]
-    polygons = [vertices[list(face.rings[0])] for face in faces]
+    rings = [vertices[list(face.rings[0])] for face in faces]
+    size = max(map(len, rings))  # matplotlib fills shorter ones with whatever is in memory
+    polygons = [np.pad(ring, ((0, size - len(ring)), (0, 0)), mode="edge") for ring in rings]
     ax.add_collection3d(
         Poly3DCollection(
             polygons, facecolors=colours, edgecolors="#333333", linewidths=0.6, alpha=0.75
