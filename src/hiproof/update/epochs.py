@@ -14,7 +14,7 @@ import shapely
 from ..city.plan.work_plan import Job, load_plan, neighbourhood
 from ..city.work.found import FoundRoof
 from ..city.work.ground import BareAround
-from ..city.work.other_classes import find_bare_cells
+from ..city.work.other_classes import find_bare_cells, find_low_cells
 from ..city.work.solve import Surroundings, open_terrain
 from ..city.work.sort import load_points
 from ..city.work.surveys import SurveyPoints
@@ -117,16 +117,27 @@ def select_points(surroundings: Surroundings, job: Job) -> np.ndarray:
     """Return the points (n, 3) of a roof and of bare ground in its outline, each once.
 
     All points of bare ground count, as all of the roof do: where one of both were thinned, what is
-    lost would weigh less than what is there.
+    lost would weigh less than what is there. So do points of other classes that lie on the ground,
+    in cells with nothing else.
     """
     roof = select_roof(surroundings, job)
     grid = surroundings.ground_grid
     bare = without_repeats(grid.xy.take(grid.inside(job.area), axis=0))
-    by_class = surroundings.select_other_points(job) if len(bare) else None
+    by_class = surroundings.select_other_points(job)
     if by_class is not None:
-        bare = find_bare_cells(dataclasses.replace(by_class, ground=bare))
+        low = fill_cells(find_low_cells(by_class, np.concatenate([roof.points, bare])))
+        bare = np.concatenate([find_bare_cells(dataclasses.replace(by_class, ground=bare)), low])
     by_shape = roof.ground[shapely.intersects_xy(job.area, *roof.ground[:, :2].T)]
     return np.concatenate([roof.points, by_shape, bare])
+
+
+def fill_cells(points: np.ndarray) -> np.ndarray:
+    """Return points (4 n, 3) every half metre of the whole-metre cells of which `points` are.
+
+    One point a cell would weigh less than the roof points that it stands beside.
+    """
+    xy = np.floor(points[:, None, :2]) + [[0.25, 0.25], [0.25, 0.75], [0.75, 0.25], [0.75, 0.75]]
+    return np.column_stack([xy.reshape(-1, 2), np.repeat(points[:, 2], 4)])
 
 
 def select_roof(surroundings: Surroundings, job: Job) -> FoundRoof:

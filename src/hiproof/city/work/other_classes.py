@@ -20,6 +20,7 @@ from ...status import Doubt
 
 CELL_M2 = 1.0  # m2; of a whole-metre cell
 HIGH_M = 2.0  # over the ground: what is lower is a hedge, a car or the ground itself
+LOW_M = 0.5  # from the ground: what lies no higher or lower is bare
 MOSTLY = 0.5  # of the outline's cells, which say why it has no points of the class
 HALF_CLASSIFIED = 0.2  # of the outline's cells, as for places without points (evaluate/layers.py)
 BESIDE_WALL_M = 1.0  # m inside the outline, where points of the ground beside a wall may lie
@@ -34,13 +35,14 @@ ROWS = 2**32  # cells from north to south, more than a world has metres
 class OtherPoints:
     """What lies inside a building's `area` beside the points of its class.
 
-    It is of each cell the ground (m, 3) and, where they lie high above it, the lowest of the other
-    points (n, 3).
+    It is of each cell the ground (m, 3) and the lowest of the other points, where these lie `high`
+    above it (n, 3) or `low`, on it (l, 3).
     """
 
     area: shapely.Geometry
     ground: np.ndarray
     high: np.ndarray
+    low: np.ndarray
 
     @classmethod
     def inside(
@@ -51,11 +53,8 @@ class OtherPoints:
         `terrain` says how high they lie.
         """
         ground, other = (points[select_inside(area, points)] for points in (ground, other))
-        return cls(
-            area,
-            ground,
-            other[other[:, 2] - terrain.height_at(other) >= HIGH_M] if len(other) else other,
-        )
+        rise = other[:, 2] - terrain.height_at(other) if len(other) else np.zeros(0)
+        return cls(area, ground, other[rise >= HIGH_M], other[np.abs(rise) < LOW_M])
 
     def share(self, cells: np.ndarray) -> float:
         """Return the share of the area that so many cells are."""
@@ -70,6 +69,19 @@ def find_bare_cells(points: OtherPoints) -> np.ndarray:
     if not len(points.high):
         return points.ground
     return points.ground[~np.isin(cell_numbers(points.ground), list_cells(points.high))]
+
+
+def find_low_cells(points: OtherPoints, covered: np.ndarray) -> np.ndarray:
+    """Return the points (k, 3) on the ground in cells in which no points `covered` (n, 3) lie.
+
+    Where a building was pulled down, they may be of no class yet. Cells count four by four: a strip
+    of them may be the foot of a wall.
+    """
+    low = points.low[~np.isin(cell_numbers(points.low), list_cells(covered))]
+    numbers = cell_numbers(low)
+    block = np.array([0, 1, ROWS, ROWS + 1])
+    corners = numbers[np.isin(numbers[:, None] + block, numbers).all(axis=1)]
+    return low[np.isin(numbers, corners[:, None] + block)]
 
 
 def explain_missing_points(points: OtherPoints, classes: Sequence[int]) -> str:
