@@ -16,6 +16,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 import shapely
 
+from ..geometry.components import label_components
 from ..model import GROUND, ROOF, WALL, Face, Solid
 from .arrangement import GRID_M
 from .check import check_solid
@@ -81,7 +82,7 @@ def building_parts(solid: Solid, planarity_m: float = 0.001) -> tuple[BuildingPa
     place_of = place_vertices(solid)
     roofs = [index for index, face in enumerate(solid.faces) if face.kind == ROOF]
     borders = plan_borders(solid, roofs, place_of)
-    groups = without_small(joined_at_edges(roofs, borders), solid, borders)
+    groups = merge_small(join_at_edges(roofs, borders), solid, borders)
     if len(groups) < 2:
         return ()
     parts = sorted(
@@ -127,49 +128,41 @@ def list_edges(ring: Sequence[Item]) -> Iterable[tuple[Item, Item]]:
     return zip(ring, (*ring[1:], ring[0]), strict=True)
 
 
-def joined_at_edges(roofs: list[int], borders: Borders) -> list[set[int]]:
-    """Group roof faces that share edges in space, directly or through others."""
-    group_of = {index: {index} for index in roofs}
-    for (a, b), current in borders.items():
-        there = borders.get((b, a))
-        if there and (current.start, current.end) == (there.end, there.start):
-            unite(group_of, current.face, there.face)
-    return distinct(group_of)
+def join_at_edges(roofs: list[int], borders: Borders) -> dict[int, int]:
+    """Return the group of each roof face: faces that share edges in space are of one."""
+    links = [
+        (roofs.index(current.face), roofs.index(there.face))
+        for (a, b), current in borders.items()
+        if (there := borders.get((b, a)))
+        and (current.start, current.end) == (there.end, there.start)
+    ]
+    labels = label_components(len(roofs), np.array(links, np.int64).reshape(-1, 2).T)
+    return dict(zip(roofs, labels.tolist(), strict=True))
 
 
-def unite(group_of: dict[int, set[int]], item: int, other: int) -> None:
-    """Make the groups of two faces one."""
-    if group_of[item] is not group_of[other]:
-        group_of[item] |= group_of[other]
-        for index in group_of[other]:
-            group_of[index] = group_of[item]
-
-
-def distinct(group_of: dict[int, set[int]]) -> list[set[int]]:
-    return list({id(group): group for group in group_of.values()}.values())
-
-
-def without_small(groups: list[set[int]], solid: Solid, borders: Borders) -> list[set[int]]:
-    """Merge groups smaller than LEAST_PART_M2 into neighbours, smallest first.
+def merge_small(group_of: dict[int, int], solid: Solid, borders: Borders) -> list[set[int]]:
+    """Return the groups, those smaller than LEAST_PART_M2 merged into neighbours, smallest first.
 
     The neighbour is the one with the longest common border.
     """
-    area = {
-        index: solid.project_face(solid.faces[index]).area for group in groups for index in group
-    }
-    group_of = {index: group for group in groups for index in group}
-    while len(groups := distinct(group_of)) > 1:
-        smallest = min(groups, key=lambda group: (sum(area[index] for index in group), min(group)))
+    area = {index: solid.project_face(solid.faces[index]).area for index in group_of}
+    while True:
+        groups: dict[int, set[int]] = {}
+        for index, number in group_of.items():
+            groups.setdefault(number, set()).add(index)
+        smallest = min(
+            groups.values(), key=lambda group: (sum(area[index] for index in group), min(group))
+        )
         shared: dict[int, float] = {}
         for (a, b), current in borders.items():
             there = borders.get((b, a))
             if current.face in smallest and there and there.face not in smallest:
-                key = min(group_of[there.face])
+                key = group_of[there.face]
                 shared[key] = shared.get(key, 0.0) + float(np.hypot(b[0] - a[0], b[1] - a[1]))
         if sum(area[index] for index in smallest) >= LEAST_PART_M2 or not shared:
-            break
-        unite(group_of, max(shared, key=lambda key: (shared[key], -key)), min(smallest))
-    return groups
+            return list(groups.values())
+        heir = max(shared, key=lambda key: (shared[key], -min(groups[key])))
+        group_of |= dict.fromkeys(smallest, heir)
 
 
 def cut_part(
