@@ -38,7 +38,7 @@ GREATEST_GAP = 0.15
 share of the year: 0.003 in pvlib's TMY3 files, 0.06 where hours are half of one off.
 """
 GREATEST_GAP_WM2 = 300.0  # of either in one hour (W/m2); up to 250 where hours are one off
-LEAST_CLEARNESS = 0.2  # of the radiation above the atmosphere: 0.3 in the dullest climates on Earth
+LEAST_CLEARNESS = 0.1  # of the radiation above the atmosphere: 0.3 in the dullest climates on Earth
 DAYLIGHT_RISE = 0.25  # sine of the sun's elevation (15 degrees) at noon from which no day is dark
 
 
