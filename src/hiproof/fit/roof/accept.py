@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...compiled import compiled
-from .draw import meets
+from .draw import is_near
 from .moves import MOVE_COLUMNS, SHARE, TO_POINTS, apply_move, list_moves
 from .price import (
     count_known_units,
@@ -125,9 +125,8 @@ def fit_roof(roof, site, rounds):
 @compiled
 def touch(roof, box, touched):
     """Mark the volumes that reach into a box, or nearly so."""
-    x0, x1, y0, y1 = box[0] - CHANGE_MARGIN_M, box[1] + CHANGE_MARGIN_M, box[2], box[3]
     for k in range(roof.counts[VOLUME_COUNT]):
-        touched[k] |= meets(roof.boxes[k], x0, x1, y0 - CHANGE_MARGIN_M, y1 + CHANGE_MARGIN_M)
+        touched[k] |= is_near(roof.boxes[k], box, CHANGE_MARGIN_M)
 
 
 @compiled

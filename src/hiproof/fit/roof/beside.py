@@ -30,12 +30,11 @@ def estimate_shift(roof: Tables, site) -> np.ndarray:
     if len(rows) < 2:
         return np.zeros(2)
     owners, eaves, toward = rows[:, 0], rows[:, 1], rows[:, 2:]
-    shift = np.zeros(2)
-    weights = np.ones(len(rows))
+    shift, weights = np.zeros(2), np.ones(len(rows))
+    groups = [owners == k for k in np.unique(owners)]
     for _ in range(ROUNDS):
         level, lean = eaves.copy(), toward.copy()
-        for k in np.unique(owners):
-            of_one = owners == k
+        for of_one in groups:
             share = weights[of_one] / weights[of_one].sum()
             level[of_one] -= share @ eaves[of_one]
             lean[of_one] -= share @ toward[of_one]

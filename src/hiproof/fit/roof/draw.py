@@ -119,6 +119,12 @@ def meets(box, x0, x1, y0, y1):
 
 
 @compiled
+def is_near(box, other, reach):
+    """Return whether a box lies no further than `reach` (m) from another."""
+    return meets(box, other[0] - reach, other[1] + reach, other[2] - reach, other[3] + reach)
+
+
+@compiled
 def number_planes(roof, view, numbers):
     """Give equal planes of the volumes in `view` one number."""
     for m in range(len(view)):

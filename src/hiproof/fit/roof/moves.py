@@ -10,7 +10,7 @@ import numpy as np
 
 from ...compiled import compiled
 from ..prices import LEAN_UNITS
-from .draw import meets
+from .draw import is_near
 from .ends import find_end
 from .tables import (
     FAR_M,
@@ -83,24 +83,13 @@ def write_move(moves, count, kind, a, b, c, d):
 
 
 @compiled
-def is_near(roof, j, k):
-    box = roof.boxes[k]
-    return meets(
-        roof.boxes[j],
-        box[0] - NEIGHBOUR_M,
-        box[1] + NEIGHBOUR_M,
-        box[2] - NEIGHBOUR_M,
-        box[3] + NEIGHBOUR_M,
-    )
-
-
-@compiled
 def list_moves(roof, site, asked, moves):
     """Write the moves that concern a volume in `asked` (v,) to `moves`. Returns their number."""
     count = 0
     for k in range(roof.counts[VOLUME_COUNT]):
         if not asked[k] or roof.n_planes[k] == 0:
             continue
+        box = roof.boxes[k]
         count = write_move(moves, count, LEAVE_OUT, k, 0, 0, 0)
         for p in range(roof.n_planes[k]):
             if roof.n_planes[k] > 1 and not site.keeps_shapes:
@@ -124,7 +113,9 @@ def list_moves(roof, site, asked, moves):
         for way in range(4 if cuts > 0 and not site.keeps_shapes else 2):
             count = write_move(moves, count, LEVEL_EAVES, k, way % 2, way // 2, 0)
         for j in range(roof.counts[VOLUME_COUNT]):
-            if j != k and roof.n_planes[j] > 0 and (j < k or not asked[j]):
+            if j == k or roof.n_planes[j] == 0 or (j > k and asked[j]):
+                continue
+            if is_near(roof.boxes[j], box, NEIGHBOUR_M):
                 count = list_merges(roof, site, j, k, moves, count)
                 count = list_equal_planes(roof, site, j, k, moves, count)
     for bay in range(len(site.bay_heights) if count > 0 else 0):
@@ -134,7 +125,7 @@ def list_moves(roof, site, asked, moves):
 
 @compiled
 def list_merges(roof, site, j, k, moves, count):
-    if roof.replaces[j] != roof.replaces[k] or not is_near(roof, j, k):
+    if roof.replaces[j] != roof.replaces[k]:
         return count
     first, second, third = (
         roof.half_planes[j, 0],
@@ -157,8 +148,6 @@ def list_merges(roof, site, j, k, moves, count):
 @compiled
 def list_equal_planes(roof, site, j, k, moves, count):
     """Write the planes of volumes j and k that are nearly one."""
-    if not is_near(roof, j, k):
-        return count
     x, y = find_centre(roof, k, site)
     for p in range(roof.n_planes[j]):
         for q in range(roof.n_planes[k]):
@@ -203,13 +192,7 @@ def list_shares(roof, site, asked, moves, count):
                 continue
             gap = abs(roof.values[a] - roof.values[b])
             box = boxes[b]
-            is_close = meets(
-                boxes[a],
-                box[0] - NEIGHBOUR_M,
-                box[1] + NEIGHBOUR_M,
-                box[2] - NEIGHBOUR_M,
-                box[3] + NEIGHBOUR_M,
-            )
+            is_close = is_near(boxes[a], box, NEIGHBOUR_M)
             alike = ALIKE_HEIGHTS_M if kinds[a] == 1 else ALIKE_SLOPES
             wide = min(max(boxes[a, 1], box[1]), site.bounds[1]) - max(
                 min(boxes[a, 0], box[0]), site.bounds[0]
@@ -246,7 +229,9 @@ def list_side_moves(roof, site, k, moves, count):
             line = site.lines[m]
             found = note_line(half, x, y, line[0], line[1], line[2], TO_OUTLINE, m + 1, near, found)
         for j in range(roof.counts[VOLUME_COUNT]):
-            if j == k or roof.n_planes[j] == 0 or not is_near(roof, j, k):
+            if j == k or roof.n_planes[j] == 0:
+                continue
+            if not is_near(roof.boxes[j], roof.boxes[k], NEIGHBOUR_M):
                 continue
             for t in range(N_SIDES):
                 line = roof.half_planes[j, t]

@@ -20,7 +20,7 @@ from ..prices import (
     VOLUME_UNITS,
 )
 from ..union.objective import compute_cell_cost, compute_point_cost
-from .draw import compute_heights, draw, list_corners, list_low_steps, meets
+from .draw import compute_heights, draw, is_near, list_corners, list_low_steps
 from .tables import LINE_COUNT, N_SIDES, ONE_PLANE, UNKNOWN_COUNT, VOLUME_COUNT, place_planes
 
 OVER_M = 0.03  # Points so far (m) beside a volume are over it.
@@ -57,9 +57,8 @@ units (1,) of its tables.
 def list_view(roof, box):
     """Return the numbers of the volumes that reach into a box, or to the points in it."""
     out, count = np.empty(roof.counts[VOLUME_COUNT], np.int64), 0
-    x0, x1, y0, y1 = box[0] - OVER_M, box[1] + OVER_M, box[2] - OVER_M, box[3] + OVER_M
     for k in range(roof.counts[VOLUME_COUNT]):
-        if roof.n_planes[k] > 0 and meets(roof.boxes[k], x0, x1, y0, y1):
+        if roof.n_planes[k] > 0 and is_near(roof.boxes[k], box, OVER_M):
             out[count] = k
             count += 1
     return out[:count]
