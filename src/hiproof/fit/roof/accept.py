@@ -165,6 +165,8 @@ def improve(roof, trial, site, drawing, asked, rounds):
                         touch(trial, roof.boxes[k], touched)
             copy_tables(trial, roof)
             known = know_change(roof, drawing, site, box, known)
+        if not touched.any():
+            return price
         place = 0
         for k in range(roof.counts[VOLUME_COUNT]):
             if roof.n_planes[k] > 0:

@@ -241,10 +241,11 @@ def list_side_moves(roof, site, k, moves, count):
                 )
         for q in range(found):
             count = write_move(moves, count, int(near[q, 1]), k, s, int(near[q, 2]), 0)
-        for step in range(len(RUN_ON_STEPS_M)):
-            count = write_move(moves, count, RUN_ON, k, s, step, 0)
-        if find_wall(site, half[0], half[1], half[2]) < 0:
+        is_on_wall = find_wall(site, half[0], half[1], half[2]) >= 0
+        if not is_on_wall:
             count = write_move(moves, count, TO_POINTS, k, s, 0, 0)
+        for step in range(1 if is_on_wall else len(RUN_ON_STEPS_M)):
+            count = write_move(moves, count, RUN_ON, k, s, step, 0)
         for m in range(len(site.lines)):
             line = site.lines[m]
             if (

@@ -51,7 +51,7 @@ def list_places(
         inside = max(len(areas), len(apart)) > 1 and is_inside(visible, owner)
         large = [area for area in (apart if inside else areas) if area.area > LEAST_PLACE_M2]
         if len(large) < 2 or (not inside and crosses(visible, owner, large)):
-            places.append((owner, whole, len(owners) > 1 or len(large) > 1))
+            places += [(owner, whole, len(owners) > 1 or len(large) > 1)] if whole else []
         else:
             places += [(owner, p, True) for p in split_region(whole, large, outline) if p]
     return places
