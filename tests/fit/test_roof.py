@@ -15,6 +15,7 @@ from hiproof.fit.roof.draw import (
 )
 from hiproof.fit.roof.moves import LEAVE_OUT, MOVE_COLUMNS, list_moves
 from hiproof.fit.roof.price import know, price_roof
+from hiproof.fit.roof.regions import split_region
 from hiproof.fit.roof.site import make_site, split_convex
 from hiproof.fit.roof.tables import (
     VOLUME_COUNT,
@@ -181,6 +182,16 @@ def test_a_polygon_is_split_into_convex_parts_that_cover_it():
         assert shapely.union_all(parts).symmetric_difference(star).area < 1e-6
         assert sum(part.area for part in parts) == pytest.approx(star.area)
         assert all(part.convex_hull.area - part.area < 1e-6 for part in parts)
+
+
+def test_places_are_cut_out_of_a_polygon_that_touches_their_surroundings_along_a_line():
+    low, far = shapely.box(1.0, 1.0, 3.0, 3.0), shapely.box(5.0, 2.2, 8.0, 3.8)
+    polygon = shapely.union_all(
+        [shapely.box(0, 0, 3, 4), shapely.box(0, 0, 10, 0.5), shapely.box(3.2, 2, 10, 4)]
+    )
+    (near,), (beside,) = split_region([polygon], [low, far], polygon)
+    assert near.contains(low.buffer(-1e-3)) and near.area < low.area + 2.0
+    assert beside.contains(far.buffer(-1e-3)) and beside.intersection(near).area < 1e-6
 
 
 @pytest.mark.parametrize("kind", ["T", "dormered"])

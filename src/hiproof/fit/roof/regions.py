@@ -110,7 +110,7 @@ def split_region(
         for g in inside:
             others = shapely.union_all([places[h] for h in inside if h != g])
             reach = shapely.buffer(places[g], BELOW_M, join_style="mitre")
-            cut = shapely.intersection(polygon, reach, grid_size=OVERLAY_GRID_M)
+            cut = with_area(shapely.intersection(polygon, reach, grid_size=OVERLAY_GRID_M))
             parts[g] += list_polygons(subtract(cut, others))
     return parts
 
