@@ -2,11 +2,11 @@
 
 Types, rectangles and fixed values stay, and the points determine the rest.
 
-One robust least squares over all parts at once (scipy's, by Tukey's biweight from coarse to fine):
-the residual of a point is its height over the roof, which is the highest part there, or its
-distance at right angles from a curved part. Each part's planes follow from its own parameters, so a
-column of the Jacobian asks one part again. The result is never further from the points than the
-start.
+One robust least squares over all parts at once (Levenberg and Marquardt, re-weighted by Tukey's
+biweight from coarse to fine): the residual of a point is its height over the roof, which is the
+highest part there, or its distance at right angles from a curved part. Each part's planes follow
+from its own parameters, so a column of the Jacobian asks one part again. The result is never
+further from the points than the start.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from .edit import rebuild
 HELD_PARAMETERS = ("width", "length", "teeth", "skew", "facing", "distance")
 STEP = 1e-4  # of a parameter, metres or degrees, for the Jacobian
 SCALES_M = (3.0, 0.8, 0.25)  # residuals beyond are outliers, from coarse to fine
-REFIT_ROUNDS = 12  # steps at each scale, at most
+REFIT_ROUNDS = 6  # steps of descent at each scale, at most
 MOST_REFIT_POINTS = 2000  # an even selection of more
 # of a point's whole cost: a start that comes so near is no further searched for from afar
 WELL = 0.3
@@ -292,14 +292,15 @@ def fit_unknowns(
     """Return the unknowns' values (p,) and all parts' standard deviations."""
     heights = Heights(parts, points[:: max(1, -(-len(points) // MOST_REFIT_POINTS))], unknowns)
     finest = SCALES_M[-1]
-    best = solve_at_scale(heights, unknowns.start, finest)
-    if best.cost > WELL * len(heights.z) * finest**2 / 6.0:
+    x = descend(heights, unknowns.start, finest)
+    surface = heights.at(x)
+    if misfit(surface.gaps, finest) > WELL * len(heights.z):
         coarse = unknowns.start
         for scale in SCALES_M:
-            result = solve_at_scale(heights, coarse, scale)
-            coarse = result.x
-        best = min(best, result, key=lambda solution: solution.cost)
-    x, surface = best.x, heights.at(best.x)
+            coarse = descend(heights, coarse, scale)
+        result = heights.at(coarse)
+        if misfit(result.gaps, finest) < misfit(surface.gaps, finest):
+            x, surface = coarse, result
     mask = np.abs(surface.gaps) < finest
     deviations = np.sqrt(
         np.diag(covariance(heights.jacobian(x, surface)[mask], surface.gaps[mask]))
@@ -311,29 +312,39 @@ def fit_unknowns(
     return x, sigma
 
 
-def solve_at_scale(heights: Heights, x: np.ndarray, scale: float) -> Any:
-    """Return scipy's solution from the unknowns x (p,), with residuals beyond `scale` as outliers.
+def descend(heights: Heights, x: np.ndarray, scale: float) -> np.ndarray:
+    """Return the unknowns at the minimum of the misfit at this scale.
 
-    Its cost is scale^2 / 6 times a point's share of Tukey's biweight, which is at most 1.
+    Damped steps each lessen it.
     """
-    from scipy.optimize import least_squares
+    unknowns, damping = heights.unknowns, 1e-3
+    surface = heights.at(x)
+    cost, slopes = misfit(surface.gaps, scale), None
+    for _ in range(REFIT_ROUNDS):
+        slopes = heights.jacobian(x, surface) if slopes is None else slopes
+        weight = np.clip(1.0 - (surface.gaps / scale) ** 2, 0.0, None) ** 2
+        normal, right = (slopes * weight[:, None]).T @ slopes, slopes.T @ (weight * surface.gaps)
+        scales = np.diag(normal) + 1e-9 * max(normal.max(initial=0.0), 1e-9)
+        step = np.linalg.solve(normal + damping * np.diag(scales), right)
+        candidates = np.clip(x + step, unknowns.low, unknowns.high)
+        result = heights.at(candidates)
+        new_cost = misfit(result.gaps, scale)
+        if new_cost >= cost:
+            damping *= 30.0
+            continue
+        gained = (cost - new_cost) / cost
+        x, surface, cost, slopes, damping = candidates, result, new_cost, None, 0.1 * damping
+        if gained < 1e-4:
+            break
+    return x
 
-    return least_squares(
-        lambda x: heights.at(x).gaps,
-        x,
-        lambda x: -heights.jacobian(x, heights.at(x)),
-        (heights.unknowns.low, heights.unknowns.high),
-        loss=weigh_by_biweight,
-        f_scale=scale,
-        ftol=1e-4,
-        max_nfev=REFIT_ROUNDS,
-    )
 
+def misfit(gaps: np.ndarray, scale: float) -> float:
+    """Return the cost of the points (n,) at this scale.
 
-def weigh_by_biweight(z: np.ndarray) -> np.ndarray:
-    """Return Tukey's biweight at squared residuals z (n,) and its two derivatives (3, n)."""
-    rest = np.clip(1.0 - z, 0.0, None)
-    return np.array([(1.0 - rest**3) / 3.0, rest**2, -2.0 * rest])
+    It is Tukey's biweight, at most 1 a point.
+    """
+    return float((1.0 - np.clip(1.0 - (gaps / scale) ** 2, 0.0, None) ** 3).sum()) + 1e-9
 
 
 def covariance(jacobian: np.ndarray, gaps: np.ndarray) -> np.ndarray:
