@@ -123,13 +123,6 @@ def fit_roof(roof, site, rounds):
 
 
 @compiled
-def touch(roof, box, touched):
-    """Mark the volumes that reach into a box, or nearly so."""
-    for k in range(roof.counts[VOLUME_COUNT]):
-        touched[k] |= is_near(roof.boxes[k], box, CHANGE_MARGIN_M)
-
-
-@compiled
 def improve(roof, trial, site, drawing, asked, rounds):
     """Improve a roof by moves that concern volumes `asked` (v,), until none saves.
 
@@ -158,11 +151,12 @@ def improve(roof, trial, site, drawing, asked, rounds):
                 break
             if try_move(roof, trial, moves[m], site, drawing, known, changed, box, True) <= least:
                 continue
-            for k in range(trial.counts[VOLUME_COUNT]):
-                if changed[k]:
-                    touch(trial, trial.boxes[k], touched)
-                    if k < roof.counts[VOLUME_COUNT]:
-                        touch(trial, roof.boxes[k], touched)
+            touched |= changed
+            # what is left out leaves its place to those around it
+            for k in range(roof.counts[VOLUME_COUNT]):
+                if changed[k] and trial.n_planes[k] == 0:
+                    for j in range(trial.counts[VOLUME_COUNT]):
+                        touched[j] |= is_near(trial.boxes[j], roof.boxes[k], CHANGE_MARGIN_M)
             copy_tables(trial, roof)
             known = know_change(roof, drawing, site, box, known)
         if not touched.any():
