@@ -130,8 +130,9 @@ def list_edges(ring: Sequence[Item]) -> Iterable[tuple[Item, Item]]:
 
 def join_at_edges(roofs: list[int], borders: Borders) -> dict[int, int]:
     """Return the group of each roof face: faces that share edges in space are of one."""
+    numbers = {face: k for k, face in enumerate(roofs)}
     links = [
-        (roofs.index(current.face), roofs.index(there.face))
+        (numbers[current.face], numbers[there.face])
         for (a, b), current in borders.items()
         if (there := borders.get((b, a)))
         and (current.start, current.end) == (there.end, there.start)

@@ -28,6 +28,11 @@ def is_url(path: str | Path) -> bool:
     return "://" in str(path)
 
 
+def locate(path: str | Path) -> str:
+    """Return an address as it is, and of a file the place to which all links to it lead."""
+    return str(path) if is_url(path) else str(Path(path).resolve())
+
+
 @contextmanager
 def open_binary(
     path: str | Path, expected: str = "a point cloud", **reading: Any

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import os
 import shutil
 from collections import Counter
 from dataclasses import dataclass
@@ -21,7 +20,7 @@ from ..evaluate.run import list_run_inputs
 from ..formats import list_requested_files
 from ..garbage import collect_rarely
 from ..masking import mask
-from ..read.remote import is_url
+from ..read.remote import locate
 from ..status import Change
 from ..write.files import refuse_overwriting
 from ..write.head import FileHead, UpdateHead
@@ -114,9 +113,9 @@ def update_area(
 
 def refuse_same_clouds(clouds: tuple[str, ...], earlier: tuple[str, ...]) -> None:
     """Raise InputError where a cloud is one of the `earlier` ones, whatever it holds now."""
-    known = {cloud if is_url(cloud) else os.path.realpath(cloud) for cloud in earlier}
+    known = set(map(locate, earlier))
     for cloud in clouds:
-        if (cloud if is_url(cloud) else os.path.realpath(cloud)) in known:
+        if locate(cloud) in known:
             raise InputError(
                 f"expected clouds of a new survey, got {mask(cloud)}, of which the run was made; "
                 "name others, and where a new survey replaced this file, move it to another folder"

@@ -31,7 +31,7 @@ from ..crs import (
     vertical_crs,
 )
 from ..plausible import MOST_HEIGHT, MOST_PLAN, compute_bounds, is_plausible
-from ..remote import is_url
+from ..remote import is_url, locate
 from . import las, ply, text
 from .las_crs import las_crs
 from .runs import RUN_POINTS
@@ -312,7 +312,7 @@ def expand_paths(paths: tuple[str | Path, ...]) -> list[str | Path]:
     files: dict[str, str | Path] = {}
     for path in paths:
         for file in expand_path(path):
-            files.setdefault(str(file) if is_url(file) else str(Path(file).resolve()), file)
+            files.setdefault(locate(file), file)
     return list(files.values())
 
 
