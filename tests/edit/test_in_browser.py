@@ -356,6 +356,10 @@ def read_focus(page):
     )
 
 
+def read_width(page):
+    return float(page.input_value("[data-name=width]"))
+
+
 def test_a_building_is_edited_by_keys_alone(page):
     first, second, *_ = page.evaluate("() => rows.map(row => row.id)")
     assert pages.list_tab_stops(page, 2)[0] == "find"
@@ -376,10 +380,15 @@ def test_a_building_is_edited_by_keys_alone(page):
     page.evaluate("() => queue")
     assert read_focus(page)["id"] == "type"
     page.focus("[data-name=width]")
-    page.keyboard.press("ArrowUp")
-    page.keyboard.press("Tab")
-    page.evaluate("() => queue")
+    width = read_width(page)
+    for _ in range(2):
+        press_key(page, "ArrowUp")
+    assert read_focus(page)["name"] == "width" and read_width(page) == width + 2
+    press_key(page, "Tab")
     assert read_focus(page)["name"] == "length"
+    page.focus("#ground")
+    press_key(page, "ArrowUp")
+    assert read_focus(page)["id"] == "ground"
     page.focus("#refit")
     page.keyboard.press("Enter")
     page.evaluate("() => queue")

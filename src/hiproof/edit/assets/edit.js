@@ -367,11 +367,8 @@ function showNumbers(part, handle) {
   if ($("drawing").dataset.type !== part.type) { $("drawing").dataset.type = part.type; $("drawing").src = `drawing?${new URLSearchParams({ type: part.type })}`; $("drawing").alt = `a ${part.type} roof with its parameters`; }
   const select = document.createElement("select");
   select.id = "type"; select.append(...start.types.map(type => new Option(typeWords(start.colours, type), type, false, type === part.type)));
-  // Letters are shortcuts again after a choice by the mouse; by keys, more choices may follow.
-  let isByKey = false;
-  select.addEventListener("keydown", () => { isByKey = true; });
-  select.addEventListener("pointerdown", () => { isByKey = false; });
-  select.addEventListener("change", () => { if (!isByKey) select.blur(); setType(select.value); });
+  leaveUnlessStepped(select, () => true);
+  select.addEventListener("change", () => setType(select.value));
   numberRow("type", select);
   const z = now.model.origin[2], sigma = part.sigma || {};
   if (handle?.place) {
@@ -390,8 +387,17 @@ const unitOf = name => /^(pitch|skew|facing)_/.test(name) ? "°" : name === "tee
 function input(name, value, changed) {
   const field = document.createElement("input");
   field.type = "number"; field.step = "any"; field.value = Number(value.toFixed(3)); field.dataset.name = name;
-  field.addEventListener("change", () => { const number = field.valueAsNumber; field.blur(); if (Number.isFinite(number)) changed(number); else show(now.model); });
+  leaveUnlessStepped(field);
+  field.addEventListener("change", () => { const number = field.valueAsNumber; if (Number.isFinite(number)) changed(number); else show(now.model); });
   return field;
+}
+
+// After the mouse or Enter, letters are shortcuts again. Keys that step to another value keep the focus: more may follow.
+function leaveUnlessStepped(field, isStep = key => key.startsWith("Arrow")) {
+  let isStepped = false;
+  field.addEventListener("keydown", ({ key }) => { isStepped = isStep(key); });
+  field.addEventListener("pointerdown", () => { isStepped = false; });
+  field.addEventListener("change", () => { if (!isStepped) field.blur(); });
 }
 
 // A row: name, field, unit, standard deviation, and a pin where a refit may change the number.
@@ -419,7 +425,8 @@ const act = action => now || action === next || action === previous ? action() :
 for (const [id, action] of Object.entries(BUTTONS)) {
   $(id).addEventListener("click", () => act(action));
 }
-$("ground").addEventListener("change", event => { const height = event.target.valueAsNumber; event.target.blur(); if (Number.isFinite(height)) setGround(height); else showWhole(); });
+leaveUnlessStepped($("ground"));
+$("ground").addEventListener("change", event => { const height = event.target.valueAsNumber; if (Number.isFinite(height)) setGround(height); else showWhole(); });
 const isTyping = ({ tagName, type }) =>
   tagName === "SELECT" || (tagName === "INPUT" && type !== "checkbox");
 document.addEventListener("keydown", event => {
