@@ -32,7 +32,7 @@ SIZE = {"width": 1360, "height": 820}
 def draw(service: Service, path: Path) -> None:
     """Draw the page with its building of most parts.
 
-    A ridge is raised by hand and refitted, and types are tried.
+    Every type is tried on the first part.
     """
     with sync_playwright() as driver:
         browser = driver.chromium.launch(executable_path=shutil.which("chromium"), args=FLAGS)

@@ -137,7 +137,7 @@ def test_the_most_doubtful_come_first(desk):
         ),
         (
             {"unexplained_area_m2": 12.0, "outline": [[[0, 0], [10, 0], [10, 8], [0, 8]]]},
-            "12 m² unexplained",
+            "12 m² of points off the roof",
         ),
     ],
 )

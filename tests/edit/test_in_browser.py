@@ -332,6 +332,8 @@ def test_axe_finds_nothing_and_the_whole_building_is_shown(browser, page_service
             press_key(page, letter)
         page.evaluate("() => inTurn(tryTypes)")
         assert page.locator("[data-try]").count() > 5
+        aside = "document.querySelector('aside')"
+        assert page.evaluate(f"() => {aside}.scrollWidth <= {aside}.clientWidth")
         assert list_complaints(page) == [] and not is_too_wide(page)
 
 

@@ -73,7 +73,7 @@ def score_unexplained(record: Mapping[str, Any]) -> tuple[float, str] | None:
         return None
     share = min(area / max(shapely.Polygon(rings[0]).area, 1.0), 1.0)
     is_large = area >= LARGE_M2 and share >= LARGE_SHARE
-    return share, f"{area:.0f} m² unexplained" if is_large else ""
+    return share, f"{area:.0f} m² of points off the roof" if is_large else ""
 
 
 def loose_parts(record: Mapping[str, Any]) -> tuple[float, str] | None:

@@ -41,7 +41,7 @@ function showList() {
     const item = document.createElement("li"), button = document.createElement("button");
     row.item = item; row.button = button;
     row.tag = element("span", "tag");
-    const name = element("span", "name", `${plainly(row.id)} ${row.type || "no model"}`);
+    const name = element("span", "name", `${plainly(row.id)} ${wordsOf(row.type)}`);
     button.append(name, row.tag, element("small", "", reasonOf(row)));
     button.dataset.open = row.id;
     button.addEventListener("click", () => inTurn(() => open(row.id)));
@@ -52,6 +52,7 @@ function showList() {
   seeCurrent();
 }
 
+const wordsOf = type => type ? typeWords(start.colours, type) : "no model";
 const reasonOf = row => row.reasons.join(", ")
   || (row.share === null ? "no points" : `${Math.round(100 * row.share)} % within 0.2 m`);
 const element = (name, className, textContent = "") =>
@@ -121,7 +122,7 @@ function largest(handles) {
 function show(model, home = false) {
   now.model = model;
   now.part = Math.min(now.part, Math.max((model.parts || []).length - 1, 0));
-  $("title").textContent = `${plainly(now.id)}: ${model.type ? typeWords(start.colours, model.type) : "no model"}`;
+  $("title").textContent = `${plainly(now.id)}: ${wordsOf(model.type)}`;
   $("reasons").textContent = [...now.reasons, now.outcome].filter(Boolean).join("; ");
   const accepted = now.accepted;
   $("accepted").textContent = accepted ? `accepted by ${accepted.who || "somebody"}, ${accepted.when || "some time ago"}${accepted.note ? `: ${accepted.note}` : ""} ` : "";
@@ -295,7 +296,7 @@ async function tryTypes() {
   say("");
   $("tried").replaceChildren(...types.map(row => {
     const button = document.createElement("button");
-    button.textContent = `${row.type} ${row.share === null ? "" : (100 * row.share).toFixed(1) + " %"}`;
+    button.textContent = `${wordsOf(row.type)} ${row.share === null ? "" : (100 * row.share).toFixed(1) + "\u00a0%"}`;
     button.dataset.try = row.type;
     button.addEventListener("click", () => { setType(row.type); refit(); });
     return button;
@@ -349,7 +350,7 @@ function showParts() {
       const swatch = document.createElement("i");
       swatch.style.background = typeColour(start.colours, part.type);
       row.dataset.part = index; row.setAttribute("aria-current", index === now.part);
-      row.append(swatch, `${index} ${part.type}`);
+      row.append(swatch, `${index} ${wordsOf(part.type)}`);
       row.addEventListener("click", () => {
         clicked = null;
         if (merging) inTurn(() => mergeWith(index)); else choose(index);
@@ -366,7 +367,7 @@ function showNumbers(part, handle) {
   if (!part) return;
   if ($("drawing").dataset.type !== part.type) { $("drawing").dataset.type = part.type; $("drawing").src = `drawing?${new URLSearchParams({ type: part.type })}`; $("drawing").alt = `a ${part.type} roof with its parameters`; }
   const select = document.createElement("select");
-  select.id = "type"; select.append(...start.types.map(type => new Option(typeWords(start.colours, type), type, false, type === part.type)));
+  select.id = "type"; select.append(...start.types.map(type => new Option(wordsOf(type), type, false, type === part.type)));
   leaveUnlessStepped(select, () => true);
   select.addEventListener("change", () => setType(select.value));
   numberRow("type", select);
