@@ -83,7 +83,7 @@ class Change(Enum):
     CHANGED = "the new points lie on another roof"
     NEW = "a building stands where none stood"
     GONE = "bare ground lies where the building stood"
-    NOT_COVERED = "the new survey hardly covers the building"
+    NOT_COVERED = "the new survey hardly covers the building, or a part of it"
     UNCERTAIN = "the new points neither confirm nor clearly contradict the earlier roof"
 
     @property
@@ -107,6 +107,7 @@ class ChangeKind(Enum):
     OUTLINE_CHANGED = "the building has another outline"
     SPLIT = "its footprint is part of an earlier one"
     MERGED = "its footprint joins earlier ones"
+    UNSEEN = "no points of the new survey show whether the roof stands"
     UNCLEAR = "points lie off the roof, on no clear surface"
     EXTENDED = "a roof beside the building lies outside its outline"
     UNMAPPED = "a roof that stood before lies outside all outlines"

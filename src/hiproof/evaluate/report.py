@@ -80,7 +80,7 @@ NEXT_STEPS = {
     ),
     "not_covered": (
         "building",
-        "not covered by the new survey. Their models are the earlier ones.",
+        "not covered by the new survey, or not in all parts. Their models are the earlier ones.",
     ),
 }
 """What a mapper does next, by class of change, or kind of a roof outside all outlines."""

@@ -13,6 +13,7 @@ clusters   connected cells that contradict the earlier roof, and how likely chan
 judge      the class of a building: unchanged, changed, gone, ...
 kinds      what changed: a part raised, a dormer built, ...
 before     the earlier points sorted and the surveys registered, before there are work tiles
+unseen     parts of the earlier roof without new points
 lineage    parts of the new roof that continue parts of the earlier one
 moved      the earlier model with parts moved up or down, or without those pulled down
 places     places that changed as parameters.jsonl holds them, roofs in one frame

@@ -127,7 +127,7 @@ def name_doubts(verdict: ChangeVerdict) -> list[Difference]:
             cluster.difference_m,
             cluster.sigma_m,
             cluster.area_m2,
-            draw_cells(c, cluster.members),
+            draw_cells(c.cells[cluster.members], c.cell_m),
         )
         for cluster in verdict.clusters
     ]
@@ -207,9 +207,8 @@ def describe_place(
     d, s = c.difference[inside], c.sigma[inside]
     sigma = math.hypot(sides.sigma_m, math.sqrt(MEDIAN_VARIANCE * np.mean(s**2) / len(d)))
     area = len(d) * c.cell_m2
-    return Difference(
-        kind, float(np.median(d)), sigma, area, draw_cells(c, np.flatnonzero(inside)), pair
-    )
+    place = draw_cells(c.cells[inside], c.cell_m)
+    return Difference(kind, float(np.median(d)), sigma, area, place, pair)
 
 
 def moves_together(differences: np.ndarray) -> bool:
@@ -249,8 +248,7 @@ def is_other_type(pair: tuple[int, int], sides: BeforeAfter) -> bool:
     return first != second and not alike
 
 
-def draw_cells(comparison: CellComparison, members: np.ndarray) -> shapely.Geometry:
-    """Return the outline of cells, in the roof's frame."""
-    low = comparison.cells[members] * comparison.cell_m
-    boxes = shapely.box(*low.T, *(low + comparison.cell_m).T)
-    return shapely.union_all(boxes)
+def draw_cells(cells: np.ndarray, cell_m: float) -> shapely.Geometry:
+    """Return the outline of cells (k, 2) with sides of `cell_m`, in the roof's frame."""
+    low = cells * cell_m
+    return shapely.union_all(shapely.box(*low.T, *(low + cell_m).T))

@@ -54,10 +54,13 @@ from .places import (
 )
 from .refine import refine_building
 from .texts import KeptBuilding, keep_texts, load_texts
+from .unseen import find_unseen
 
 BEGINNING = (Change.CHANGED, Change.NEW)  # the roof as it is begins with the survey
 TESTED = (Change.CHANGED, Change.UNCHANGED, Change.UNCERTAIN, Change.GONE)
 """Classes of buildings that were tested; others have too few points."""
+
+UNDIVIDED = (Change.GONE, Change.NOT_COVERED)  # classes that hold for all parts of a building
 
 SHIFT_DIGITS = 3  # of footprints: millimetres
 
@@ -143,7 +146,9 @@ class Updater:
         if roof is None or earlier.status is Status.FROM_ATTRIBUTES:
             return self.revisit_empty(job, member)
         verdict = self.judge(job, member.record, earlier, roof)
-        if verdict.change is Change.UNCHANGED and member.is_same_outline:
+        c = verdict.comparison
+        unseen = [] if c is None or verdict.change in UNDIVIDED else find_unseen(roof, c)
+        if verdict.change is Change.UNCHANGED and member.is_same_outline and not unseen:
             kept = self.refine(job, member.record) if self.surveys.refine else None
             kept = kept or keep_texts(earlier, member.record, self.texts)
             if kept is not None:
@@ -153,6 +158,13 @@ class Updater:
         earlier = with_model(earlier, roof, self.plan.settings.compose)
         lost = LostParts.find(verdict, roof, earlier.local_ground)
         result = self.follow_verdict(job, member, earlier, verdict, lost)
+        places = record_places(unseen, roof.frame)
+        if places and result is earlier:
+            verdict = dataclasses.replace(verdict, change=Change.NOT_COVERED)
+            return self.mark(earlier, verdict, places, member)
+        if places and result.change:
+            change = result.change | {"places": [*result.change["places"], *places]}
+            result = dataclasses.replace(result, change=change)
         return result if lost is None else lost.doubt(result)
 
     def judge(

@@ -1,0 +1,157 @@
+"""Parts of roofs that a new survey does not show: an update never calls these unchanged."""
+
+import dataclasses
+import json
+import shutil
+
+import numpy as np
+import pytest
+import shapely
+
+from hiproof.city.request import Request
+from hiproof.city.run import reconstruct_area
+from hiproof.simulate import random_building
+from hiproof.update.cells import SurveyNoise, compare_points
+from hiproof.update.judge import is_not_covered
+from hiproof.update.request import UpdateRequest
+from hiproof.update.run import update_area
+from hiproof.update.unseen import find_unseen
+from run_records import by_id
+from tiny_town import ORIGIN, make_town, write_cloud, write_footprints
+
+WING = (6.0, 5.0)  # m: its length and width, east of every house but the last
+
+
+def make_winged(density, seed):
+    """The tiny town with a flat wing at the eastern wall of each house but the last."""
+    town, wings = make_town(density=density, seed=seed), {}
+    rng = np.random.default_rng([seed, 5])
+    outlines, xyz, codes = dict(town.footprints), town.xyz.copy(), town.classification.copy()
+    for id in list(outlines)[:-1]:
+        _, y0, x1, _ = outlines[id].bounds
+        wing = shapely.box(x1, y0 + 1.0, x1 + WING[0], y0 + 1.0 + WING[1])
+        inside = shapely.intersects_xy(wing, *xyz[:, :2].T)
+        xyz[inside, 2] = ORIGIN[2] + 3.2 + rng.normal(0, 0.03, inside.sum())
+        codes[inside] = 6
+        outlines[id], wings[id] = outlines[id].union(wing), wing
+    return dataclasses.replace(town, xyz=xyz, classification=codes, footprints=outlines), wings
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """The folder of a run over the town with wings."""
+    folder = tmp_path_factory.mktemp("run")
+    town, _ = make_winged(8.0, 0)
+    cloud = write_cloud(folder / "first.laz", town.xyz, town.classification)
+    outlines = write_footprints(folder / "outlines.geojson", town.footprints)
+    reconstruct_area(Request((str(cloud),), folder / "models", str(outlines), id_attribute="id"))
+    return folder / "models"
+
+
+def update(run, out, town):
+    cloud = str(write_cloud(out.with_suffix(".laz"), town.xyz, town.classification))
+    parameters = str(run / "parameters.jsonl")
+    request = UpdateRequest((cloud,), out, run=run, run_parameters=parameters, date="2024-05-01")
+    update_area(request)
+    return by_id(out)
+
+
+def take_class(row):
+    return (row.get("change") or {"class": "unchanged"})["class"]
+
+
+def hide(town, inside):
+    keep = ~inside
+    return dataclasses.replace(town, xyz=town.xyz[keep], classification=town.classification[keep])
+
+
+def raise_unclassified(town, inside):
+    up = town.xyz + inside[:, None] * [0.0, 0.0, 3.0]
+    codes = np.where(inside, 1, town.classification)
+    return dataclasses.replace(town, xyz=up, classification=codes.astype(np.uint8))
+
+
+@pytest.mark.parametrize("change", [hide, raise_unclassified])
+@pytest.mark.parametrize(("density", "seed"), [(2.0, 1), (4.0, 2), (8.0, 3), (16.0, 4)])
+def test_a_wing_without_points_of_the_roof_is_not_called_unchanged(
+    run, change, density, seed, tmp_path
+):
+    town, wings = make_winged(density, seed)
+    wing = wings["house-1"]
+    town = change(town, shapely.intersects_xy(wing, *town.xyz[:, :2].T))
+    before, after = by_id(run), update(run, tmp_path / "out", town)
+    classes = {id: take_class(row) for id, row in after.items()}
+    assert classes == dict.fromkeys(classes, "unchanged") | {"house-1": "not_covered"}
+    (place,) = after["house-1"]["change"]["places"]
+    assert place["kind"] == "unseen"
+    assert place["area"] == pytest.approx(wing.area, rel=0.35)
+    assert after["house-1"]["parts"] == before["house-1"]["parts"]
+
+
+def test_without_the_earlier_clouds_the_model_says_what_could_be_seen(run, tmp_path):
+    models = shutil.copytree(run, tmp_path / "models")
+    record = json.loads((models / "run.json").read_text().replace("first.laz", "moved.laz"))
+    (models / "run.json").write_text(json.dumps(record))
+    town, wings = make_winged(6.0, 6)
+    town = hide(town, shapely.intersects_xy(wings["house-2"], *town.xyz[:, :2].T))
+    with pytest.warns(UserWarning, match="compared with its models alone"):
+        after = update(models, tmp_path / "out", town)
+    classes = {id: take_class(row) for id, row in after.items()}
+    assert classes == dict.fromkeys(classes, "unchanged") | {"house-2": "not_covered"}
+
+
+@pytest.mark.parametrize("seed", [7, 8])
+def test_a_changed_house_also_names_its_unseen_wing(run, seed, tmp_path):
+    town, wings = make_winged(6.0, seed)
+    main = town.footprints["house-1"].difference(wings["house-1"])
+    up = shapely.intersects_xy(main, *town.xyz[:, :2].T) & (town.classification == 6)
+    town.xyz[up, 2] += 2.5
+    town = hide(town, shapely.intersects_xy(wings["house-1"], *town.xyz[:, :2].T))
+    change = update(run, tmp_path / "out", town)["house-1"]["change"]
+    assert change["class"] == "changed"
+    kinds = [place["kind"] for place in change["places"]]
+    assert kinds[-1] == "unseen" and "raised" in kinds[0]
+
+
+def scan(rng, roof, density):
+    x0, y0, x1, y1 = roof.outline.bounds
+    xy = rng.uniform((x0, y0), (x1, y1), (rng.poisson(density * (x1 - x0) * (y1 - y0)), 2))
+    points = np.column_stack([xy, roof.height_at(xy) + rng.normal(0, 0.03, len(xy))])
+    return points[np.isfinite(points[:, 2])]
+
+
+def find(roof, old, new):
+    comparison = compare_points(roof, old, new, SurveyNoise())
+    if is_not_covered(comparison, roof):
+        return None
+    return sum(place.area_m2 for place in find_unseen(roof, comparison))
+
+
+@pytest.mark.parametrize("has_old", [True, False])
+@pytest.mark.parametrize("density", [0.5, 1.0, 3.0, 10.0])
+def test_chance_hides_no_part_of_300_roofs(density, has_old):
+    rng, areas = np.random.default_rng([int(2 * density), has_old]), []
+    for _ in range(300):
+        roof = random_building(rng).roof
+        old = scan(rng, roof, 6.0) if has_old else None
+        areas.append(find(roof, old, scan(rng, roof, density)) or 0.0)
+    assert sum(area > 0 for area in areas) <= 1, sorted(areas)[-3:]
+
+
+@pytest.mark.parametrize("has_old", [True, False])
+@pytest.mark.parametrize("density", [1.0, 3.0, 10.0])
+def test_a_hidden_end_of_a_roof_is_measured(density, has_old):
+    rng, ratios = np.random.default_rng([int(density), 3]), []
+    while len(ratios) < 60:
+        roof = random_building(rng).roof
+        x0, y0, x1, y1 = roof.outline.bounds
+        cut = x1 - rng.uniform(0.2, 0.45) * (x1 - x0)
+        hidden = roof.outline.intersection(shapely.box(cut, y0, x1, y1))
+        if hidden.buffer(-1.2 * max(1.0, np.sqrt(9.0 / density))).area < 4.0:
+            continue  # hardly wider than the holes that chance makes
+        old, new = scan(rng, roof, 6.0), scan(rng, roof, density)
+        area = find(roof, old if has_old else None, new[new[:, 0] < cut])
+        if area is not None:  # else little of it is covered at all
+            ratios.append(area / hidden.area)
+    assert sum(ratio > 0.5 for ratio in ratios) >= 57, sorted(ratios)[:6]
+    assert max(ratios) < 1.4
