@@ -84,8 +84,6 @@ NEW_UNITS, NEW_MOVED_UNITS = 6.0, 1.0
 Of 334 best additions 324 are still found.
 """
 
-CUT_UNITS = 10.0  # cutting a volume short, before its neighbours are drawn out
-
 # How much the points of a place must cost for a volume to be looked for.
 
 ROOF_UNITS = 5.0  # of a roof that explains all but poorly

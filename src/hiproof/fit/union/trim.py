@@ -10,9 +10,8 @@ import numpy as np
 
 from .moves import remove_volume
 from .objective import compute_objective
-from .prices import CUT_UNITS, SLACK_UNITS
+from .prices import SLACK_UNITS
 from .scene import Scene, list_nodes
-from .steps import list_near
 from .volumes import (
     DIRECTION,
     U0,
@@ -27,8 +26,6 @@ HIDDEN_M = 0.35  # Edges that are hidden by more (m) are drawn in.
 COVER_M = 0.25  # They are drawn in to this distance (m) beyond what is visible.
 NEAR_EDGE_M = 0.5  # An edge within this distance (m) of what is visible is the place for a side.
 NEAR_VERTEX_M = 0.3  # A corner within this distance (m) of what is visible is the place for a side.
-RUN_GAP_M = 0.8  # Length (m) over which a volume is hidden that is visible in several places.
-RUN_GAP_NODES = 2.5  # The same in the raster's steps, which are long on large roofs.
 # The outward direction of the low and the high edge along an axis.
 OUTWARDS = np.array([-1.0, 1.0])
 
@@ -38,7 +35,7 @@ def trim(volumes: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray, f
 
     Edges are drawn in to what is visible of each volume. Also returns the objective.
     """
-    volumes, value = draw_out(volumes, scene, value, np.arange(1, len(volumes)))
+    volumes, value = draw_out(volumes, scene, value)
     U, V = list_nodes(scene)
     _, top = compute_roof_heights(volumes, U, V, UNSORTED)
     k = 1
@@ -53,36 +50,14 @@ def trim(volumes: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray, f
         else:
             direction = int(volumes[k, DIRECTION])
             for column, x in ((U0, U[direction][visible]), (V0, V[direction][visible])):
-                starts, ends, counts = find_runs(x, scene.pitch)
-                for edge, seen_to in ((column, starts[0]), (column + 1, ends[-1])):
+                for edge, seen_to in ((column, x.min()), (column + 1, x.max())):
                     volumes, value = draw_in(volumes, scene, value, k, edge, float(seen_to), U, V)
-                longest = int(np.argmax(counts))
-                for edge, seen_to in ((column, starts[longest]), (column + 1, ends[longest])):
-                    volumes, value = cut_short(volumes, scene, value, k, edge, float(seen_to))
         k += 1
     return volumes, value
 
 
-def find_runs(x: np.ndarray, pitch: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Find the runs of places x (n,) that are close together.
-
-    Places of one run are no more than a few steps of the raster apart. Returns where the runs begin
-    and end (m,), and how many places each has.
-    """
-    gap, lowest, highest = max(RUN_GAP_M, RUN_GAP_NODES * pitch), x.min(), x.max()
-    # With places in every half of a gap there is one run, found without sorting.
-    if np.bincount(((x - lowest) * (2.0 / gap)).astype(int)).all():
-        return np.array([lowest]), np.array([highest]), np.array([len(x)])
-    x = np.sort(x)
-    gaps = np.flatnonzero(x[1:] - x[:-1] > gap)
-    first, last = np.concatenate(([0], gaps + 1)), np.concatenate((gaps, [len(x) - 1]))
-    return x[first], x[last], last - first + 1
-
-
-def draw_out(
-    volumes: np.ndarray, scene: Scene, value: float, numbers: np.ndarray
-) -> tuple[np.ndarray, float]:
-    """Draw edges of the volumes `numbers` out to the line of corners next to each.
+def draw_out(volumes: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray, float]:
+    """Draw edges of the volumes out to the line of corners next to each.
 
     An edge is drawn out if that costs nearly nothing.
     """
@@ -92,23 +67,13 @@ def draw_out(
     )
     distances = OUTWARDS[:, None] * (lines[:, :, None] - edges)
     nearest = np.where(distances > 0.0, distances, np.inf).min(axis=3).reshape(-1, 4)
-    for q, edge in np.argwhere(nearest[numbers] < NEAR_VERTEX_M):
-        k, trial = numbers[q], volumes.copy()
+    for k, edge in np.argwhere(nearest[1:] < NEAR_VERTEX_M) + (1, 0):
+        trial = volumes.copy()
         trial[k, U0 + edge] += OUTWARDS[edge % 2] * nearest[k, edge]
         trial_value = compute_objective(trial, scene, value + SLACK_UNITS * scene.evidence)
         if np.isfinite(trial_value):
             volumes, value = trial, trial_value
     return volumes, value
-
-
-def list_around(volumes: np.ndarray, k: int, scene: Scene) -> np.ndarray:
-    """Return the numbers of the volumes whose edges could be drawn out over volume k."""
-    wide = volumes.copy()
-    wide[k, [U0, V0]] -= NEAR_VERTEX_M
-    wide[k, [U1, V1]] += NEAR_VERTEX_M
-    neighbours = list_near(wide, scene.turn, -1)[k]
-    around = neighbours[1 : 1 + neighbours[0]]
-    return np.sort(around[around > 0])
 
 
 def draw_in(
@@ -157,30 +122,6 @@ def changes_heights(
     U, V = (np.ascontiguousarray(axis[:, is_between]) for axis in (U, V))
     heights = [compute_roof_heights(rows, U, V, UNSORTED)[0] for rows in (volumes, trial)]
     return not np.array_equal(*heights)
-
-
-def cut_short(
-    volumes: np.ndarray, scene: Scene, value: float, k: int, edge: int, seen_to: float
-) -> tuple[np.ndarray, float]:
-    """Cut edge `edge` (a column) of volume k at `seen_to`.
-
-    Most of what is visible of it ends there. Neighbours must take the rest for nearly nothing.
-    """
-    is_low = edge in (U0, V0)
-    if (seen_to - volumes[k, edge] if is_low else volumes[k, edge] - seen_to) < HIDDEN_M:
-        return volumes, value
-    trial = volumes.copy()
-    trial[k, edge] = next(iter(list_near_lines(volumes, scene, k, edge, seen_to)), seen_to)
-    if not has_width(trial[k]):
-        return volumes, value
-    trial_value = compute_objective(trial, scene, value + CUT_UNITS * scene.evidence)
-    if np.isfinite(trial_value):
-        trial, trial_value = draw_out(trial, scene, trial_value, list_around(volumes, k, scene))
-    return (
-        (trial, trial_value)
-        if trial_value < value + SLACK_UNITS * scene.evidence
-        else (volumes, value)
-    )
 
 
 def has_width(row: np.ndarray) -> bool:
