@@ -1,6 +1,4 @@
-"""The planar arrangement behind a solid: compiled, on an integer grid.
-
-So every orientation test is exact.
+"""The planar arrangement behind a solid, on an integer grid, so every orientation test is exact.
 
 Plan coordinates are int64 in units of `GRID_M` (0.1 mm), which is also how CityJSON rounds: what is
 valid here stays valid when written. Segments are noded with a *reach*: afterwards no two vertices
@@ -13,17 +11,18 @@ twin of h is h ^ 1. Polygons are soups of edges (x0, y0, x1, y1) in any order; i
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
 import numpy as np
 
 from ..compiled import compiled
-from ..geometry.arrays import copy_row, sort_order, sort_values
+from ..geometry.arrays import copy_row, sort_values
+from ..geometry.components import label_components
 from ..geometry.point_in_polygon import flips
 from .buckets import append_row, enter_edge, enter_item, grow_array, lay_buckets, list_near
 
 GRID_M = 1e-4  # m; how CityJSON is rounded, so that what is checked is what is written
 OUTSIDE, UNCOVERED = -1, -2  # labels of faces that no plane covers
-UNSEEN_UNITS = 100.0  # a centimetre: a face thinner than that is none
-BEYOND_UNITS = 1000.0  # a decimetre by which a face may rise or fall further than what is around it
 # units of GRID_M, half a millimetre: a vertex nearer to its neighbours' line is none
 COLLINEAR_UNITS = 5.0
 
@@ -230,100 +229,139 @@ def take_back(xy, vertex, crossed, edges, items, stack, top, reach):
     return top
 
 
-@compiled
-def half_edge_order(xy, edges):
-    """Sort half-edges by origin, then counter-clockwise.
+def heights(planes: np.ndarray, x: Any, y: Any) -> Any:
+    """Return the heights of planes (..., 3) at places, in grid units."""
+    return planes[..., 0] * x + planes[..., 1] * y + planes[..., 2]
 
-    Returns the order (2e,) and the start (n + 1,) of each vertex's run in it.
+
+def find_previous(owner: np.ndarray) -> np.ndarray:
+    """Return the place before each in its run of equal owners (n,), in a circle.
+
+    >>> find_previous(np.array([4, 4, 4, 7]))
+    array([2, 0, 1, 3])
     """
-    size = 2 * len(edges)
-    angle = np.empty(size)
-    start = np.zeros(len(xy) + 1, np.int64)
-    for h in range(size):
-        a, b = edges[h >> 1, h & 1], edges[h >> 1, 1 - (h & 1)]
-        angle[h] = np.arctan2(float(xy[b, 1] - xy[a, 1]), float(xy[b, 0] - xy[a, 0]))
-        start[a + 1] += 1
-    start = np.cumsum(start)
-    order = np.empty(size, np.int64)
-    fill = start.copy()
-    for h in sort_order(angle):
-        a = edges[h >> 1, h & 1]
-        order[fill[a]] = h
-        fill[a] += 1
-    return order, start
+    place = np.arange(len(owner))
+    end = np.searchsorted(owner, owner, side="right")
+    return np.where(place == np.searchsorted(owner, owner), end, place) - 1
 
 
-@compiled
-def next_half_edges(edges, order, start):
-    """Return the half-edge that follows each around the face on its left."""
-    follow = np.empty(len(order), np.int64)
-    for v in range(len(start) - 1):
-        for k in range(start[v], start[v + 1]):
-            previous = k - 1 if k > start[v] else start[v + 1] - 1
-            follow[order[k] ^ 1] = order[previous]
-    return follow
+class HalfEdges(NamedTuple):
+    """The half-edges (2e,) of an arrangement, and the faces on their left.
 
-
-@compiled
-def find_face_left(xy, edges, x, y):
-    """Return the half-edge that the ray from (x, y) towards -x hits first.
-
-    The point lies on its left. It is -1 if there is none. y is no integer.
+    `order` sorts them by origin, then counter-clockwise. `follow` is the next one around the `face`
+    of each. Face 0 is unbounded. `area` (f,) is in square grid units.
     """
-    best, best_x = -1, -np.inf
-    for e in range(len(edges)):
-        a, b = edges[e, 0], edges[e, 1]
-        if (xy[a, 1] > y) == (xy[b, 1] > y):
-            continue
-        t = (y - xy[a, 1]) / (xy[b, 1] - xy[a, 1])
-        at_x = xy[a, 0] + t * (xy[b, 0] - xy[a, 0])
-        if at_x < x and at_x > best_x:
-            best_x = at_x
-            best = 2 * e if xy[a, 1] > xy[b, 1] else 2 * e + 1
-    return best
+
+    order: np.ndarray
+    follow: np.ndarray
+    face: np.ndarray
+    area: np.ndarray
 
 
-@compiled
-def trace_faces(xy, edges, follow):
-    """Trace the face on the left of each half-edge (2e,), and faces' areas (f,).
-
-    Areas are in square grid units. Face 0 is unbounded.
+def trace_faces(xy: np.ndarray, edges: np.ndarray) -> HalfEdges:
+    """Trace the faces of an arrangement of vertices (n, 2) and edges (e, 2).
 
     Holes belong to the face around them: the outer walk of every island is handed to the face found
     by a ray from its leftmost vertex.
     """
-    size = len(follow)
-    walk = np.full(size, -1, np.int64)
-    walk_area, lowest = np.zeros(size + 1), np.zeros(size + 1, np.int64)
-    walks = 0
-    for first in range(size):
-        if walk[first] >= 0:
+    origin, end = edges.ravel(), edges[:, ::-1].ravel()
+    dx, dy = (xy[end] - xy[origin]).T
+    order = np.lexsort((np.arctan2(dy, dx), origin))
+    follow = np.empty_like(order)
+    follow[order ^ 1] = order[find_previous(origin[order])]
+    walk = label_components(len(follow), np.array([np.arange(len(follow)), follow]))
+    anchor = xy[origin[np.unique(walk, return_index=True)[1]]][walk]
+    (ax, ay), (bx, by) = ((xy[v] - anchor).T.astype(float) for v in (origin, end))
+    size = 0.5 * np.bincount(walk, ax * by - bx * ay)
+    face_of_walk = np.where(size > 0, np.cumsum(size > 0), 0)
+    area = np.append(0.0, size[size > 0])
+    by_place = np.lexsort((xy[origin, 1], xy[origin, 0], walk))
+    leftmost = xy[origin[by_place[np.unique(walk[by_place], return_index=True)[1]]]]
+    start_y, end_y = xy[origin, 1], xy[end, 1]
+    for w in np.argsort(leftmost[:, 0], kind="stable"):
+        if size[w] > 0:
             continue
-        h, area2, lower = first, 0.0, edges[first >> 1, first & 1]
-        x0, y0 = xy[lower, 0], xy[lower, 1]
-        while walk[h] < 0:
-            walk[h] = walks
-            a, b = edges[h >> 1, h & 1], edges[h >> 1, 1 - (h & 1)]
-            area2 += float(xy[a, 0] - x0) * (xy[b, 1] - y0) - float(xy[b, 0] - x0) * (xy[a, 1] - y0)
-            if xy[a, 0] < xy[lower, 0] or (xy[a, 0] == xy[lower, 0] and xy[a, 1] < xy[lower, 1]):
-                lower = a
-            h = follow[h]
-        walk_area[walks], lowest[walks] = 0.5 * area2, lower
-        walks += 1
-    face_of_walk = np.zeros(walks, np.int64)
-    area = np.zeros(walks + 1)
-    faces = 1
-    for w in range(walks):
-        if walk_area[w] > 0:
-            face_of_walk[w], area[faces] = faces, walk_area[w]
-            faces += 1
-    for w in sort_order(1.0 * xy[lowest[:walks], 0]):
-        if walk_area[w] <= 0:
-            lower = lowest[w]
-            hit = find_face_left(xy, edges, xy[lower, 0] - 0.5, xy[lower, 1] + 0.5)
-            face_of_walk[w] = 0 if hit < 0 else face_of_walk[walk[hit]]
-            area[face_of_walk[w]] += walk_area[w]
-    return face_of_walk[walk], area[:faces].copy()
+        x, y = leftmost[w] + (-0.5, 0.5)
+        down = np.flatnonzero((start_y > y) & (end_y < y))
+        share = (y - start_y[down]) / (end_y[down] - start_y[down])
+        at_x = xy[origin[down], 0] + share * dx[down]
+        at_x[at_x >= x] = -np.inf
+        if np.isfinite(at_x).any():
+            face_of_walk[w] = face_of_walk[walk[down[at_x.argmax()]]]
+        area[face_of_walk[w]] += size[w]
+    return HalfEdges(order, follow, face_of_walk[walk], area)
+
+
+def edge_lengths(xy: np.ndarray, edges: np.ndarray) -> np.ndarray:
+    return np.hypot(*(xy[edges[:, 0]] - xy[edges[:, 1]]).T.astype(float))
+
+
+def dissolve(
+    xy: np.ndarray, edges: np.ndarray, side: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Drop edges with one label on both sides, then straight vertices.
+
+    Returns (xy, edges, side), compacted. `side` (e, 2) holds the labels left and right.
+    """
+    is_border = side[:, 0] != side[:, 1]
+    edges = drop_straight_vertices(xy, edges[is_border])
+    return renumber_vertices(xy, edges, side[is_border])
+
+
+def renumber_vertices(
+    xy: np.ndarray, edges: np.ndarray, side: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Renumber vertices in the order in which edges name them, without the unused ones.
+
+    Edges of negative vertices are left out.
+    """
+    is_live = edges[:, 0] >= 0
+    used, first, number = np.unique(edges[is_live].ravel(), return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    return xy[used[order]], np.argsort(order)[number].reshape(-1, 2), side[is_live]
+
+
+@compiled
+def drop_straight_vertices(xy, edges):
+    """Return the edges (e, 2) without straight vertices; vertices of edges that go are -1.
+
+    A vertex goes when it lies within COLLINEAR_UNITS of the line between its two neighbours,
+    counting what was already dropped along them.
+    """
+    degree, touching = np.zeros(len(xy), np.int64), np.zeros((len(xy), 2), np.int64)
+    for e in range(len(edges)):
+        for end in range(2):
+            v = edges[e, end]
+            if degree[v] < 2:
+                touching[v, degree[v]] = e
+            degree[v] += 1
+    drift = np.zeros(len(edges))
+    changed = True
+    while changed:
+        changed = False
+        for v in range(len(xy)):
+            if degree[v] != 2:
+                continue
+            e, g = touching[v, 0], touching[v, 1]
+            a = edges[e, 0] if edges[e, 1] == v else edges[e, 1]
+            b = edges[g, 0] if edges[g, 1] == v else edges[g, 1]
+            off = abs(turn(xy[a], xy[b], xy[v])) / max(
+                np.hypot(float(xy[a, 0] - xy[b, 0]), float(xy[a, 1] - xy[b, 1])), 1
+            )
+            off += max(drift[e], drift[g])
+            if (
+                a == b
+                or off > COLLINEAR_UNITS
+                or not is_beside(xy[v], xy[a], xy[b], 2 * COLLINEAR_UNITS)
+            ):
+                continue
+            edges[e, 0 if edges[e, 0] == v else 1] = b
+            drift[e] = off
+            edges[g, 0] = edges[g, 1] = -1
+            degree[v] = 0
+            touching[b, 0 if touching[b, 0] == g else 1] = e
+            changed = True
+    return edges
 
 
 @compiled
@@ -352,14 +390,14 @@ def measure_chord(xy, edges, h, last, earlier):
 
 
 @compiled
-def face_points(xy, edges, face, faces):
+def face_points(xy, edges, face, faces, length):
     """Return a point (f, 2) well inside each face.
 
-    It is the middle of the face's longest chord at right angles to an edge's middle.
+    It is the middle of the face's longest chord at right angles to an edge's middle. `length` (e,)
+    is that of the edges.
     """
     longest, best, points = np.zeros(faces), np.zeros(faces), np.zeros((faces, 2))
     last, earlier = np.full(faces, -1, np.int64), np.empty(len(face), np.int64)
-    length = edge_lengths(xy, edges)
     for h in range(len(face)):
         longest[face[h]] = max(longest[face[h]], length[h >> 1])
         earlier[h], last[face[h]] = last[face[h]], h
@@ -443,260 +481,6 @@ def label_faces(
             if covers(patches, patch_start, patch_boxes, p, x, y):
                 label[f], patched[f] = patch_label[p], True
     return label, patched
-
-
-@compiled
-def join_regions(edges, face, label):
-    """Return the region (f,) of each face.
-
-    Faces are joined over edges that have the same label on both sides.
-    """
-    parent = np.arange(len(label))
-    for e in range(len(edges)):
-        if label[face[2 * e]] == label[face[2 * e + 1]]:
-            join(parent, face[2 * e], face[2 * e + 1])
-    for f in range(len(label)):
-        parent[f] = find_root(parent, f)
-    return parent
-
-
-@compiled
-def edge_lengths(xy, edges):
-    length = np.empty(len(edges))
-    for e in range(len(edges)):
-        d = xy[edges[e, 0]] - xy[edges[e, 1]]
-        length[e] = np.hypot(float(d[0]), float(d[1]))
-    return length
-
-
-@compiled
-def merge_slivers(xy, edges, face, area, label, patched, planes, min_area, min_width):
-    """Give every region too small or thin to a neighbour, smallest first.
-
-    The neighbour is the one with the longest common border.
-
-    A patch alone comes last, for what lies between it and the region it belongs to may become that
-    region's. One that would carry its plane on to where no roof is around keeps out, unless nobody
-    could see the region.
-    """
-    length, selection = edge_lengths(xy, edges), np.zeros(len(label), np.bool_)
-    for _ in range(len(label)):
-        region = join_regions(edges, face, label)
-        size, border = np.zeros(len(label)), np.zeros(len(label))
-        open_to, is_patch = np.zeros(len(label), np.bool_), np.ones(len(label), np.bool_)
-        for f in range(1, len(label)):
-            size[region[f]] += area[f]
-            is_patch[region[f]] &= patched[f]
-        for e in range(len(edges)):
-            a, b = region[face[2 * e]], region[face[2 * e + 1]]
-            if a != b:
-                border[a] += length[e]
-                border[b] += length[e]
-                if label[a] != OUTSIDE and label[b] != OUTSIDE:
-                    open_to[a] = open_to[b] = True
-        smallest = -1
-        for r in range(1, len(label)):
-            sliver = (
-                region[r] == r
-                and open_to[r]
-                and (size[r] < min_area or 2 * size[r] < min_width * border[r])
-            )
-            if sliver and not selection[r]:
-                sooner = is_patch[smallest] and not is_patch[r]
-                if (
-                    smallest < 0
-                    or sooner
-                    or (is_patch[smallest] == is_patch[r] and size[r] < size[smallest])
-                ):
-                    smallest = r
-        if smallest < 0:
-            break
-        unseen = (
-            size[smallest] < min_area
-            or 2 * size[smallest] < min(min_width, UNSEEN_UNITS) * border[smallest]
-        )
-        heir = choose_heir(xy, edges, face, label, region, length, planes, smallest, unseen)
-        for f in range(len(label)):
-            if region[f] == smallest:
-                selection[f] = heir == OUTSIDE
-                label[f] = label[f] if selection[f] else heir
-
-
-@compiled
-def choose_heir(xy, edges, face, label, region, length, planes, sliver, anyone):
-    """Return the label of the region that takes a sliver over.
-
-    It shares the longest border with the sliver, and its planes stay over it within the heights
-    around it (or it is `anyone`). It is OUTSIDE where there is none.
-    """
-    shared, fits = np.zeros(len(label)), np.ones(len(label), np.bool_)
-    lower, upper = np.inf, -np.inf
-    for e in range(len(edges)):
-        a, b = region[face[2 * e]], region[face[2 * e + 1]]
-        if a == b or (a != sliver and b != sliver):
-            continue
-        other = b if a == sliver else a
-        shared[other] += length[e] if label[other] != OUTSIDE else 0.0
-        for r in (sliver, other):
-            if label[r] >= 0:
-                for end in range(2):
-                    z = evaluate_height(planes[label[r]], xy[edges[e, end]])
-                    lower, upper = min(lower, z), max(upper, z)
-    for e in range(len(edges)):
-        if (region[face[2 * e]] == sliver) != (region[face[2 * e + 1]] == sliver):
-            for r in range(1, len(label)):
-                if shared[r] > 0.0 and label[r] >= 0:
-                    for end in range(2):
-                        z = evaluate_height(planes[label[r]], xy[edges[e, end]])
-                        fits[r] = fits[r] and lower - BEYOND_UNITS < z < upper + BEYOND_UNITS
-    none_fits = True
-    for r in range(len(label)):
-        none_fits = none_fits and not (fits[r] and shared[r] > 0.0)
-    anyone = label[sliver] < 0 or (anyone and none_fits)
-    heir, longest = OUTSIDE, 0.0
-    for r in range(len(label)):
-        if (fits[r] or anyone) and shared[r] > longest:
-            heir, longest = label[r], shared[r]
-    return heir
-
-
-@compiled
-def evaluate_height(plane, place):
-    return plane[0] * place[0] + plane[1] * place[1] + plane[2]
-
-
-@compiled
-def keep_largest_component(edges, face, area, label):
-    """Turn all but the largest connected inside to OUTSIDE.
-
-    A neck thinner than the reach has been cut.
-    """
-    parent = np.arange(len(label))
-    for e in range(len(edges)):
-        a, b = face[2 * e], face[2 * e + 1]
-        if label[a] != OUTSIDE and label[b] != OUTSIDE:
-            join(parent, a, b)
-    size = np.zeros(len(label))
-    for f in range(1, len(label)):
-        if label[f] != OUTSIDE:
-            size[find_root(parent, f)] += area[f]
-    largest = np.argmax(size)
-    for f in range(1, len(label)):
-        if find_root(parent, f) != largest:
-            label[f] = OUTSIDE
-
-
-@compiled
-def renumber_vertices(xy, edges, side):
-    """Renumber the vertices of the edges that are left.
-
-    Their first vertex is not negative. Returns the edges, their sides and the vertices they use.
-    """
-    number = np.full(len(xy), -1, np.int64)
-    out_xy, out_edges = np.empty((len(xy), 2), np.int64), np.empty((len(edges), 2), np.int64)
-    out_side = np.empty((len(edges), 2), np.int64)
-    count, selection = 0, 0
-    for e in range(len(edges)):
-        if edges[e, 0] < 0:
-            continue
-        for end in range(2):
-            v = edges[e, end]
-            if number[v] < 0:
-                number[v] = count
-                copy_row(out_xy[count], xy[v])
-                count += 1
-            out_edges[selection, end] = number[v]
-        copy_row(out_side[selection], side[e])
-        selection += 1
-    return out_xy[:count].copy(), out_edges[:selection].copy(), out_side[:selection].copy()
-
-
-@compiled
-def dissolve(xy, edges, side):
-    """Drop edges with one label on both sides, then straight vertices.
-
-    Returns (xy, edges, side), compacted.
-
-    `side` (e, 2) holds the labels left and right of each edge. A vertex goes when it lies within
-    COLLINEAR_UNITS of the line between its two neighbours, counting what was already dropped along
-    them.
-    """
-    count = 0
-    for e in range(len(edges)):
-        if side[e, 0] != side[e, 1]:
-            copy_row(edges[count], edges[e])
-            copy_row(side[count], side[e])
-            count += 1
-    edges, side = edges[:count].copy(), side[:count].copy()
-    degree, touching = np.zeros(len(xy), np.int64), np.zeros((len(xy), 2), np.int64)
-    for e in range(count):
-        for end in range(2):
-            v = edges[e, end]
-            if degree[v] < 2:
-                touching[v, degree[v]] = e
-            degree[v] += 1
-    drift = np.zeros(count)
-    changed = True
-    while changed:
-        changed = False
-        for v in range(len(xy)):
-            if degree[v] != 2:
-                continue
-            e, g = touching[v, 0], touching[v, 1]
-            a = edges[e, 0] if edges[e, 1] == v else edges[e, 1]
-            b = edges[g, 0] if edges[g, 1] == v else edges[g, 1]
-            off = abs(turn(xy[a], xy[b], xy[v])) / max(
-                np.hypot(float(xy[a, 0] - xy[b, 0]), float(xy[a, 1] - xy[b, 1])), 1
-            )
-            off += max(drift[e], drift[g])
-            if (
-                a == b
-                or off > COLLINEAR_UNITS
-                or not is_beside(xy[v], xy[a], xy[b], 2 * COLLINEAR_UNITS)
-            ):
-                continue
-            edges[e, 0 if edges[e, 0] == v else 1] = b
-            drift[e] = off
-            edges[g, 0] = edges[g, 1] = -1
-            degree[v] = 0
-            touching[b, 0 if touching[b, 0] == g else 1] = e
-            changed = True
-    return renumber_vertices(xy, edges, side)
-
-
-@compiled
-def plan_cells(
-    segments,
-    reach,
-    soup,
-    soup_start,
-    planes,
-    plane_start,
-    group,
-    patches,
-    patch_start,
-    patch_label,
-    min_area,
-    min_width,
-):
-    """Return the cells of the plan in which one plane is active.
-
-    They are labelled edges: xy (n, 2), edges (e, 2), side (e, 2).
-
-    `planes` give grid units from grid units. Cells too small are merged away, also uncovered ones;
-    what remains UNCOVERED is for the caller to see in `side`.
-    """
-    xy, edges = node(segments, reach)
-    order, start = half_edge_order(xy, edges)
-    face, area = trace_faces(xy, edges, next_half_edges(edges, order, start))
-    points = face_points(xy, edges, face, len(area))
-    label, patched = label_faces(
-        points, soup, soup_start, planes, plane_start, group, patches, patch_start, patch_label
-    )
-    merge_slivers(xy, edges, face, area, label, patched, planes, min_area, min_width)
-    keep_largest_component(edges, face, area, label)
-    side = label[face].reshape(-1, 2)
-    return dissolve(xy, edges, side)
 
 
 @compiled
@@ -794,19 +578,3 @@ def meeting_lines(soup, soup_start, planes, plane_start):
                             )
                             count += 1
     return out[:count].copy()
-
-
-@compiled
-def find_root(parent, i):
-    """Return the root of the set of `i`, shortening `parent` (n,) on the way."""
-    while parent[i] != i:
-        parent[i] = parent[parent[i]]
-        i = parent[i]
-    return i
-
-
-@compiled
-def join(parent, i, j):
-    """Make the sets of `i` and `j` one, whose root is the lower of both."""
-    a, b = find_root(parent, i), find_root(parent, j)
-    parent[max(a, b)] = min(a, b)

@@ -6,111 +6,32 @@ Outline, pieces and the lines where the active plane changes are arranged.
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
 import shapely
 
-from ..compiled import compiled
 from ..errors import CompositionError
 from ..model import Roof
 from .arrangement import (
     GRID_M,
     OUTSIDE,
     UNCOVERED,
-    half_edge_order,
-    is_beside,
+    dissolve,
+    edge_lengths,
+    face_points,
+    heights,
+    label_faces,
     meeting_lines,
-    next_half_edges,
-    plan_cells,
+    node,
     renumber_vertices,
     trace_faces,
-    turn,
 )
-from .levels import evaluate_plane
+from .slivers import keep_largest_component, merge_slivers
 
 # units of the grid, 3 mm: beside a shorter edge no face can be flat to val3dity's 20 degrees
 SHORT_UNITS = 30.0
-
-
-@compiled
-def edges_at(edges, v):
-    """Return the first two edges that end in vertex v, and how many do.
-
-    A missing edge is -1.
-    """
-    result, count = (-1, -1), 0
-    for e in range(len(edges)):
-        if edges[e, 0] == v or edges[e, 1] == v:
-            result = (e, result[1]) if count == 0 else (result[0], e) if count == 1 else result
-            count += 1
-    return result[0], result[1], count
-
-
-@compiled
-def gap_at(xy, side, planes, e, v):
-    """Return how far apart the planes beside edge e are over vertex v."""
-    return abs(
-        evaluate_plane(planes, side[e, 0], xy[v, 0], xy[v, 1])
-        - evaluate_plane(planes, side[e, 1], xy[v, 0], xy[v, 1])
-    )
-
-
-@compiled
-def is_clear(xy, edges, missing, stays, distant, reach):
-    """Return whether edge (missing, distant) can become (stays, distant).
-
-    No vertex may lie in the triangle between them or within reach of it.
-    """
-    for e in range(len(edges)):
-        for v in edges[e]:
-            if v < 0 or v in (missing, stays, distant):
-                continue
-            if is_beside(xy[v], xy[stays], xy[distant], reach):
-                return False
-            a, b, c = (
-                turn(xy[missing], xy[stays], xy[v]),
-                turn(xy[stays], xy[distant], xy[v]),
-                turn(xy[distant], xy[missing], xy[v]),
-            )
-            if (a >= 0) == (b >= 0) and (b >= 0) == (c >= 0):
-                return False
-    return True
-
-
-@compiled
-def without_short_edges(xy, edges, side, planes, reach):
-    """Drop an end of every edge between two cells that is shorter than 3 mm.
-
-    Returns (xy, edges, side), compacted.
-
-    Only an end where nothing else meets can go, of two the one over which the cells are further
-    apart. Outlines stay.
-    """
-    edges = edges.copy()
-    for e in range(len(edges)):
-        u, v = edges[e]
-        if u < 0 or side[e, 0] == OUTSIDE or side[e, 1] == OUTSIDE:
-            continue
-        if np.hypot(float(xy[u, 0] - xy[v, 0]), float(xy[u, 1] - xy[v, 1])) >= SHORT_UNITS:
-            continue
-        if gap_at(xy, side, planes, e, u) < gap_at(xy, side, planes, e, v):
-            u, v = v, u
-        for missing, stays in ((u, v), (v, u)):
-            first, second, count = edges_at(edges, missing)
-            other = second if first == e else first
-            end = 0 if edges[other, 0] == missing else 1
-            distant = edges[other, 1 - end]
-            if (
-                count != 2
-                or distant == stays
-                or not is_clear(xy, edges, missing, stays, distant, reach)
-            ):
-                continue
-            edges[other, end] = stays
-            edges[e, 0] = edges[e, 1] = -1
-            break
-    return renumber_vertices(xy, edges, side)
 
 
 # m from the frame's origin: on the integer grid, areas beyond would not fit 64 bits
@@ -240,31 +161,71 @@ def arrange(
     Where no piece covers the outline, the piece beside it is extended.
     """
     for _ in range(4):
-        soup, soup_start = stacked_soups(problem.soups)
-        patches, patch_start = stacked_soups([patch for patch, _ in problem.patches])
-        patch_label = np.array([label for _, label in problem.patches], np.int64)
-        lines = meeting_lines(soup, soup_start, problem.planes, problem.plane_start)
-        segments = np.concatenate((soup.astype(np.int64), patches.astype(np.int64), lines))
-        xy, edges, side = plan_cells(
-            segments,
-            reach,
-            soup,
-            soup_start,
-            problem.planes,
-            problem.plane_start,
-            problem.group,
-            patches,
-            patch_start,
-            patch_label,
-            min_area_m2 / GRID_M**2,
-            min_width_m / GRID_M,
-        )
-        if not (side == UNCOVERED).any():
-            return PlanCells(*without_short_edges(xy, edges, side, problem.planes, reach))
-        problem = extend_over_gaps(problem, PlanCells(xy, edges, side))
+        cells = find_cells(problem, reach, min_area_m2 / GRID_M**2, min_width_m / GRID_M)
+        if not (cells.side == UNCOVERED).any():
+            return drop_short_edges(cells, problem.planes, reach)
+        problem = extend_over_gaps(problem, cells)
     raise CompositionError(
         "expected the roof's pieces to reach all of its outline, got gaps that no piece borders"
     )
+
+
+def find_cells(problem: PlanProblem, reach: float, min_area: float, min_width: float) -> PlanCells:
+    """Return the cells of the plan in which one plane is active.
+
+    Cells too small are merged away, also uncovered ones. What remains UNCOVERED is for the caller
+    to see.
+    """
+    outlines, planes = stacked_soups(problem.soups), (problem.planes, problem.plane_start)
+    patches = stacked_soups([patch for patch, _ in problem.patches])
+    patch_label = np.array([label for _, label in problem.patches], np.int64)
+    lines = meeting_lines(*outlines, *planes)
+    soups = (outlines[0].astype(np.int64), patches[0].astype(np.int64), lines)
+    xy, edges = node(np.concatenate(soups), reach)
+    traced = trace_faces(xy, edges)
+    points = face_points(xy, edges, traced.face, len(traced.area), edge_lengths(xy, edges))
+    label, patched = label_faces(points, *outlines, *planes, problem.group, *patches, patch_label)
+    merge_slivers(xy, edges, traced, label, patched, problem.planes, min_area, min_width)
+    keep_largest_component(traced, label)
+    return PlanCells(*dissolve(xy, edges, label[traced.face].reshape(-1, 2)))
+
+
+def drop_short_edges(cells: PlanCells, planes: np.ndarray, reach: float) -> PlanCells:
+    """Drop an end of every edge between two cells that is shorter than 3 mm.
+
+    Only an end where nothing else meets can go, of two the one over which the cells are further
+    apart. Outlines stay.
+    """
+    places, ends = cells.xy.tolist(), cells.edges.tolist()
+    for e, sides in enumerate(cells.side.tolist()):
+        if ends[e][0] < 0 or OUTSIDE in sides:
+            continue
+        ends_here = [places[v] for v in ends[e]]
+        if math.dist(*ends_here) >= SHORT_UNITS:
+            continue
+        gap = np.abs(np.diff([heights(planes[sides], *place) for place in ends_here])).ravel()
+        u, v = ends[e] if gap[0] >= gap[1] else ends[e][::-1]
+        for missing, stays in ((u, v), (v, u)):
+            meeting = [k for k, pair in enumerate(ends) if missing in pair and k != e]
+            distant = [w for k in meeting for w in ends[k] if w != missing]
+            if (
+                len(meeting) == 1
+                and distant != [stays]
+                and is_clear(cells.xy, ends, [missing, stays, *distant], reach)
+            ):
+                ends[meeting[0]] = [stays if w == missing else w for w in ends[meeting[0]]]
+                ends[e] = [-1, -1]
+                break
+    return PlanCells(
+        *renumber_vertices(cells.xy, np.array(ends, np.int64).reshape(-1, 2), cells.side)
+    )
+
+
+def is_clear(xy: np.ndarray, ends: list[list[int]], corners: list[int], reach: float) -> bool:
+    """Return whether a triangle of vertices is farther than the `reach` from all other vertices."""
+    others = np.setdiff1d(ends, [-1, *corners])
+    triangle = shapely.Polygon(xy[corners])
+    return not shapely.dwithin(triangle, shapely.points(xy[others]), reach).any()
 
 
 def extend_over_gaps(problem: PlanProblem, cells: PlanCells) -> PlanProblem:
@@ -272,9 +233,7 @@ def extend_over_gaps(problem: PlanProblem, cells: PlanCells) -> PlanProblem:
 
     Its planes are those of the piece that the cell borders most.
     """
-    follow = next_half_edges(cells.edges, *half_edge_order(cells.xy, cells.edges))
-    face, _ = trace_faces(cells.xy, cells.edges, follow)
-    label = cells.side.ravel()
+    face, label = trace_faces(cells.xy, cells.edges).face, cells.side.ravel()
     for gap in np.unique(face[label == UNCOVERED]):
         indices = np.flatnonzero((face == gap) & (face[np.arange(len(face)) ^ 1] != gap))
         soup = cells.xy[cells.edges[indices >> 1]].reshape(-1, 4).astype(float)

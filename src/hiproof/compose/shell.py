@@ -8,30 +8,19 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
 from ..errors import CompositionError
 from ..model import GROUND, ROOF, WALL, Face, Solid
-from .arrangement import COLLINEAR_UNITS, GRID_M, OUTSIDE
+from .arrangement import COLLINEAR_UNITS, GRID_M, OUTSIDE, heights
 from .cells import PlanCells, PlanProblem
-from .levels import find_saddles, split_at_crossings, stack_levels
+from .levels import Levels, find_saddles, split_at_crossings, stack_levels
 
 Item = TypeVar("Item")
 
 SETBACK_M = 0.01  # m that a crosswise corner is cut back by; ten times what makes two points one
-
-
-class Levels(NamedTuple):
-    """Half-edges with the levels over their origins, as `stack_levels` returns them."""
-
-    order: np.ndarray
-    start: np.ndarray
-    follow: np.ndarray
-    face: np.ndarray
-    level: np.ndarray
-    vertices: np.ndarray
 
 
 class Saddles(Exception):
@@ -73,12 +62,11 @@ def raise_shell(
         )
     z_low = lowest_roof(xy, edges, side, planes) - clearance_m / GRID_M
     z_base = np.floor(min(z_ground / GRID_M, z_low))
-    levels = Levels(*stack_levels(xy, edges, side, planes, z_base, ties))
-    saddles = find_saddles(levels.order, levels.start, levels.level, levels.face, side.ravel())
-    if saddles.any():
+    levels = stack_levels(xy, edges, side, planes, z_base, ties)
+    saddles = find_saddles(edges, levels, side.ravel())
+    if len(saddles):
         radius = max(SETBACK_M / GRID_M, 4 * reach) * widening
-        vertices = np.flatnonzero(saddles).tolist()
-        raise Saddles([cure(sectors_at(v, xy, edges, side, levels), radius) for v in vertices])
+        raise Saddles([cure(sectors_at(v, xy, edges, side, levels), radius) for v in saddles])
     # from here on numbers of a few dozen edges: plain lists are faster than arrays
     label, xyz = side.ravel().tolist(), levels.vertices.tolist()
     follow, face, level = levels.follow.tolist(), levels.face.tolist(), levels.level.tolist()
@@ -96,10 +84,9 @@ def raise_shell(
 
 def lowest_roof(xy: np.ndarray, edges: np.ndarray, side: np.ndarray, planes: np.ndarray) -> float:
     """Return the lowest roof height at any vertex of any cell, in grid units."""
-    label = np.repeat(side.ravel(), 2)
-    corners = xy[np.repeat(edges, 2, axis=0)].reshape(-1, 2)[label != OUTSIDE]
-    a, b, c = planes[label[label != OUTSIDE]].T
-    return float((a * corners[:, 0] + b * corners[:, 1] + c).min())
+    label = side.ravel()
+    x, y = np.moveaxis(xy[np.repeat(edges, 2, axis=0)], -1, 0)
+    return float(heights(planes[label, None], x, y)[label != OUTSIDE].min())
 
 
 def walks(follow: list[int], selection: list[bool]) -> list[list[int]]:
@@ -321,7 +308,7 @@ def sectors_at(
     v: int, xy: np.ndarray, edges: np.ndarray, side: np.ndarray, levels: Levels
 ) -> Sectors:
     """Return the sectors around plan vertex v."""
-    surroundings = levels.order[levels.start[v] : levels.start[v + 1]]
+    surroundings = levels.order[edges.ravel()[levels.order] == v]
     arms = (xy[edges[surroundings >> 1, 1 - (surroundings & 1)]] - xy[v]).astype(float)
     angle = np.arctan2(arms[:, 1], arms[:, 0])
     opening = np.mod(np.roll(angle, -1) - angle, 2 * np.pi)
