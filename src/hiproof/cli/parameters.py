@@ -103,7 +103,7 @@ def make_parameter(
         help=help,
         multiple=is_list,
         is_flag=kind is bool,
-        **{"show_default": True, **attributes},
+        **{"show_default": parameter.default != "", **attributes},
     )
 
 
