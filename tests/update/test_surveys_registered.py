@@ -27,18 +27,23 @@ def scan(rng, roof, density=8.0):
     return np.column_stack([xy, z + rng.normal(0, 0.03, len(xy))])[np.isfinite(z)]
 
 
-def draw_samples(seed, rises, shift=(0.0, 0.0, 0.0), has_ground=True, tilt=0.0):
-    """Roofs that rose by `rises`, in surveys that lie beside each other by `shift`."""
+def draw_samples(seed, rises, shift=(0.0, 0.0, 0.0), has_ground=True, tilt=0.0, slopes=None):
+    """Roofs that rose by `rises`, in surveys that lie beside each other by `shift`.
+
+    `slopes` (n, 2) are those of the ground around them.
+    """
     rng, samples = np.random.default_rng(seed), []
-    for rise in rises:
+    slopes = np.zeros((len(rises), 2)) if slopes is None else slopes
+    for rise, slope in zip(rises, slopes, strict=True):
         place = rng.uniform(0, SIDE_M, 2)
         roof = random_building(rng).roof
         roof = dataclasses.replace(roof, frame=LocalFrame(np.array([*place, 0.0])))
         leaning = tilt * place[0] / SIDE_M
         new = scan(rng, roof) + shift + np.array([0.0, 0.0, rise + leaning])
         around = place + rng.uniform(-15, 15, (80 * has_ground, 2))
-        dz = shift[2] + leaning + rng.normal(0, 0.04, len(around))
-        samples.append(SampledRoof(roof, scan(rng, roof), new, np.column_stack([around, dz])))
+        dz = shift[2] + leaning - slope @ shift[:2] + rng.normal(0, 0.04, len(around))
+        ground = np.column_stack([around, dz, np.tile(slope, (len(around), 1))])
+        samples.append(SampledRoof(roof, scan(rng, roof), new, ground))
     return samples
 
 
@@ -60,6 +65,24 @@ def test_however_many_houses_grow_the_shift_is_that_of_the_ground(seed, share, s
     assert found.noise.roof < 0.05
 
 
+@pytest.mark.parametrize("kind", ["a slope", "a valley"])
+@pytest.mark.parametrize("percent", [10, 20, 30])
+@pytest.mark.parametrize(("share", "aside"), [(0.0, 0.5), (0.6, 0.3)])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_slope_moved_aside_is_no_height(seed, share, aside, percent, kind):
+    rng = np.random.default_rng([seed, percent])
+    slopes = np.full((20, 1), percent / 100) * [1.0, 0.4]
+    slopes *= rng.choice([-1.0, 1.0], (20, 1)) if kind == "a valley" else 1.0
+    shift = np.array([*rng.choice([-aside, aside], 2), 0.05])
+    found = register_surveys(
+        draw_samples(seed, draw_rises(seed, 20, share), shift, slopes=slopes), READ
+    )
+    assert not found.doubt and not found.tilt
+    assert found.clear_xyz == pytest.approx(shift, abs=0.05)
+    assert found.clear_xyz[2] == pytest.approx(0.05, abs=0.03)
+    assert found.ground == pytest.approx(0.05, abs=0.03)
+
+
 @pytest.mark.parametrize("count", [1, 2, 5])
 @pytest.mark.parametrize("rise", [3.0, 0.4])
 def test_a_change_of_all_houses_is_no_shift(count, rise):
@@ -76,7 +99,8 @@ def test_slopes_that_face_one_way_and_rose_are_not_moved_aside(seed, rise):
     for place in rng.uniform(0, SIDE_M, (9, 2)):
         part = make_part("monopitch", SHED, 0.3, np.array([0.0, 0.0, 6.0]))
         roof = Roof((part,), part.outlines[0], LocalFrame(np.array([*place, 0.0])))
-        ground = np.column_stack([place + rng.uniform(-15, 15, (80, 2)), rng.normal(0, 0.04, 80)])
+        around = place + rng.uniform(-15, 15, (80, 2))
+        ground = np.column_stack([around, rng.normal(0, 0.04, 80), np.zeros((80, 2))])
         samples.append(SampledRoof(roof, scan(rng, roof), scan(rng, roof) + [0, 0, rise], ground))
     found = register_surveys(samples, READ)
     assert found.clear_xyz.tolist() == [0.0, 0.0, 0.0]

@@ -161,10 +161,13 @@ def find_ground(surroundings: Surroundings, job: Job) -> np.ndarray:
 
 
 def compare_ground(ground: np.ndarray, new: Surroundings, job: Job) -> np.ndarray:
-    """Return places (m, 3) of the ground, and how much higher it lies now.
+    """Return places of the ground, how much higher it lies now, and its slope (m, 5).
 
-    `ground` (n, 3) is the earlier one. The terrain model of an update is that of no survey, so it
-    does not count.
+    `ground` (n, 3) is the earlier one. The terrain model of an update is
+    that of no survey, so it does not count.
     """
     rise = TerrainChain(new.without_model().find_grounds(job)).height_at(ground) - ground[:, 2]
-    return np.column_stack([ground[:, :2], rise])[np.isfinite(rise)]
+    known = np.isfinite(rise)
+    xyz = ground[known] - ground[known].mean(axis=0) if known.any() else ground[:0]
+    slope = np.linalg.lstsq(xyz[:, :2], xyz[:, 2], rcond=None)[0]
+    return np.column_stack([ground[known, :2], rise[known], np.tile(slope, (len(xyz), 1))])

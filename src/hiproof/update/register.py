@@ -58,6 +58,10 @@ CARRIED_BESIDE_GROUND, CARRIED_ALONE = 0.1, 2 / 3
 """Least share of the roofs' area that has to lie where a shift puts it: where the ground shows the
 same shift, and where there is no ground."""
 
+GROUND_ROUNDS = 3
+"""Times that the ground's height and the shift aside are estimated: on slopes each bends the other.
+"""
+
 HELD_WEIGHT = 1e9  # weight (1/m2) of a height that is not to move
 
 FEWEST_ROOFS = 8
@@ -85,14 +89,14 @@ ENOUGH_ROOFS = 60
 class SampledRoof(NamedTuple):
     """A building's earlier roof, with points (n, 3) of both surveys.
 
-    Points are in the roof's frame, `old` is None where unknown. `ground` (m, 3) are places around
-    it in the world, and how much higher the new ground lies there.
+    Points are in the roof's frame, `old` is None where unknown. `ground` (m, 5) are places around
+    it in the world, how much higher the new ground lies there, and its slope in x and y.
     """
 
     roof: Roof
     old: np.ndarray | None
     new: np.ndarray
-    ground: np.ndarray = np.zeros((0, 3))
+    ground: np.ndarray = np.zeros((0, 5))
 
 
 @dataclass(frozen=True)
@@ -221,12 +225,13 @@ def register_surveys(samples: Iterable[SampledRoof], read: ReadSettings) -> Surv
     rows = [rows for _, rows in pairs]
     ground = measure_ground(samples)
     heights = [float(np.median(residuals)) for _, residuals in rows]
-    start = float(np.median(ground[:, 2])) if len(ground) else float(np.median(heights))
-    shift, sigma = (
-        solve_shift(rows, start, bool(len(ground)))
-        if fixed is None
-        else (np.array(fixed), np.zeros(3))
-    )
+    shift, sigma = np.zeros(3) if fixed is None else np.array(fixed), np.zeros(3)
+    for _ in range(GROUND_ROUNDS):
+        level = float(np.median(ground[:, 2] + ground[:, 3:] @ shift[:2])) if len(ground) else 0.0
+        if fixed is None:
+            start = level if len(ground) else float(np.median(heights))
+            shift, sigma = solve_shift(rows, start, bool(len(ground)))
+    ground[:, 2] += ground[:, 3:] @ shift[:2]
     offsets = np.array([np.median(residuals - design @ shift) for design, residuals in rows])
     is_agreeing = np.abs(offsets) < SHIFT_SCALES_M[-1]
     result = SurveyShift(
@@ -235,7 +240,7 @@ def register_surveys(samples: Iterable[SampledRoof], read: ReadSettings) -> Surv
         len(rows),
         int(is_agreeing.sum()),
         len(ground),
-        round(start, 4) if len(ground) else 0.0,
+        round(level, 4),
         measure_tilt(ground if len(ground) else place_roofs(pairs, offsets)[is_agreeing]),
     )
     areas = np.array([sample.roof.outline.area for sample, _ in pairs])
@@ -254,9 +259,9 @@ def register_surveys(samples: Iterable[SampledRoof], read: ReadSettings) -> Surv
 
 
 def measure_ground(samples: list[SampledRoof]) -> np.ndarray:
-    """Return places (n, 3), and how much higher the new ground lies there."""
+    """Return places, how much higher the new ground lies there, and its slopes (n, 5)."""
     places = [np.median(s.ground, axis=0) for s in samples if len(s.ground)]
-    return np.array(places).reshape(-1, 3)
+    return np.array(places).reshape(-1, 5)
 
 
 def place_roofs(pairs: list[tuple[SampledRoof, Any]], off: np.ndarray) -> np.ndarray:
@@ -266,7 +271,7 @@ def place_roofs(pairs: list[tuple[SampledRoof, Any]], off: np.ndarray) -> np.nda
 
 
 def measure_tilt(places: np.ndarray) -> float:
-    """Return by how much (m) heights at `places` (n, 3) rise across them.
+    """Return by how much (m) heights at `places` (n, 3 or more) rise across them.
 
     It is 0 where that is unclear.
 
