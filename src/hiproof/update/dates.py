@@ -44,8 +44,9 @@ def find_survey_date(
     that is dated by headers has to be no older than those of the `earlier_clouds`. Raises
     InputError where `named` is no date, where nothing tells one, or where it is before `earlier`.
     """
-    date = read_date(named) if named else read_survey_date(clouds)
-    if not (earlier or named or date_by_points(clouds)):
+    timed = "" if named else date_by_points(clouds)
+    date = read_date(named) if named else timed or date_untimed(clouds)
+    if not (earlier or named or timed):
         earlier = date_by_headers(earlier_clouds)
     if date[: len(earlier)] < earlier:
         raise InputError(
@@ -56,11 +57,8 @@ def find_survey_date(
     return date
 
 
-def read_survey_date(clouds: tuple[str, ...]) -> str:
-    """Return the date of a survey by its points, else by the headers of its files."""
-    timed = date_by_points(clouds)
-    if timed:
-        return timed
+def date_untimed(clouds: tuple[str, ...]) -> str:
+    """Return the date of a survey by the headers of its files, with a warning."""
     date = date_by_headers(clouds)
     if not date:
         raise InputError(
