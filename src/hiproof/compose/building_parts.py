@@ -20,7 +20,6 @@ from ..geometry.components import label_components
 from ..model import GROUND, ROOF, WALL, Face, Solid
 from .arrangement import GRID_M
 from .check import check_solid
-from .shell import compact_solid
 
 Item = TypeVar("Item")
 
@@ -187,7 +186,9 @@ def cut_part(
     faces = [*(solid.faces[index] for index in sorted(group)), *walls, ground]
     outer, *holes = (np.array(ring) * GRID_M for ring in rings)
     return BuildingPart(
-        compact_solid(vertices, faces), shapely.Polygon(outer, holes), list_members(solid, group)
+        Solid(vertices, tuple(faces)).drop_unused_vertices(),
+        shapely.Polygon(outer, holes),
+        list_members(solid, group),
     )
 
 

@@ -79,7 +79,7 @@ def raise_shell(
         for run in runs
     ]
     faces.append(ground_face(follow, level, label, skip, xyz))
-    return compact_solid(np.round(levels.vertices * GRID_M, 4), faces)
+    return Solid(np.round(levels.vertices * GRID_M, 4), tuple(faces)).drop_unused_vertices()
 
 
 def lowest_roof(xy: np.ndarray, edges: np.ndarray, side: np.ndarray, planes: np.ndarray) -> float:
@@ -254,17 +254,6 @@ def make_wall_ring(run: list[int], rises: dict[int, tuple[int, int, int, int]]) 
             ring += range(start, end, 1 if end > start else -1)
     ring += range(high_u, low_u, -1)
     return list(dict.fromkeys(ring))
-
-
-def compact_solid(vertices: np.ndarray, faces: list[Face]) -> Solid:
-    """Return a solid of those `vertices` (n, 3) that faces use."""
-    in_use = sorted({v for face in faces for ring in face.rings for v in ring})
-    number = {vertex: index for index, vertex in enumerate(in_use)}
-    faces = [
-        Face(tuple([tuple([number[v] for v in ring]) for ring in face.rings]), face.kind, face.part)
-        for face in faces
-    ]
-    return Solid(vertices[in_use], tuple(faces))
 
 
 @dataclass(frozen=True)

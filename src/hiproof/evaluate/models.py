@@ -259,16 +259,10 @@ def compact(vertices: np.ndarray, faces: tuple[Face, ...]) -> Solid:
 
     Each of these must be a place; raises ValueError otherwise.
     """
-    rings = [ring for face in faces for ring in (face.rings or ((),))]
-    smallest = min(len(set(ring)) for ring in rings)
+    smallest = min(len(set(ring)) for face in faces for ring in (face.rings or ((),)))
     if smallest < 3:
         raise ValueError(f"a ring of {smallest} points")
-    in_use = sorted({index for ring in rings for index in ring})
-    if not is_plausible(vertices[in_use]).all():
+    solid = Solid(vertices, faces).drop_unused_vertices()
+    if not is_plausible(solid.vertices).all():
         raise ValueError("coordinates of no place on Earth")
-    place = {index: i for i, index in enumerate(in_use)}
-    renumbered = (
-        Face(tuple(tuple(place[i] for i in ring) for ring in face.rings), face.kind, face.part)
-        for face in faces
-    )
-    return Solid(vertices[in_use], tuple(renumbered))
+    return solid

@@ -21,7 +21,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial import cKDTree
 
+from ..geometry.components import label_components
 from ..geometry.grid import number_cells
 from ..geometry.point_in_polygon import find_inside
 from ..log import count_things
@@ -271,23 +273,12 @@ def largest_cluster(
     return result
 
 
-def clusters_in_plan(points: np.ndarray, cell_m: float) -> list[list[int]]:
+def clusters_in_plan(points: np.ndarray, cell_m: float) -> list[np.ndarray]:
     """Return indices of points (n, 3), in groups whose plan cells touch.
 
     Cells also touch at corners.
     """
-    members: dict[tuple[int, int], list[int]] = {}
-    for index, (column, row) in enumerate(np.floor(points[:, :2] / cell_m).astype(int).tolist()):
-        members.setdefault((column, row), []).append(index)
-    groups = []
-    while members:
-        (column, row), group = members.popitem()
-        waiting = [(column, row)]
-        while waiting:
-            column, row = waiting.pop()
-            surroundings = ((column + i, row + j) for i in (-1, 0, 1) for j in (-1, 0, 1))
-            for cell in [cell for cell in surroundings if cell in members]:
-                group += members.pop(cell)
-                waiting.append(cell)
-        groups.append(group)
-    return groups
+    cells, number = number_cells(np.floor(points[:, :2] / cell_m))
+    touching = cKDTree(cells).query_pairs(1.5, output_type="ndarray")
+    label = label_components(len(cells), touching.T)[number]
+    return [np.flatnonzero(label == k) for k in range(label.max(initial=-1) + 1)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
@@ -44,6 +44,16 @@ class Solid:
 
     def move(self, shift: np.ndarray) -> Solid:
         return Solid(self.vertices + shift, self.faces, self.defects)
+
+    def drop_unused_vertices(self) -> Solid:
+        """Return the solid with only the vertices that its faces use, in their order."""
+        used = np.unique(self.flatten()[0])
+        number = {vertex: index for index, vertex in enumerate(used.tolist())}
+        faces = tuple(
+            replace(face, rings=tuple(tuple([number[v] for v in ring]) for ring in face.rings))
+            for face in self.faces
+        )
+        return replace(self, vertices=self.vertices[used], faces=faces)
 
     @property
     def volume(self) -> float:

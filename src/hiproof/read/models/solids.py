@@ -147,14 +147,11 @@ def shell_solid(
 
     A shell is faces of rings of indices.
     """
-    result = read_shell(shell, values, surfaces, len(vertices))
-    in_use = sorted({index for surface in result for ring in surface.rings for index in ring})
-    number = {index: k for k, index in enumerate(in_use)}
-    faces = []
-    for surface in result:
-        rings = tuple(tuple(number[index] for index in ring) for ring in surface.rings)
-        faces.append(Face(tuple(ring[::-1] for ring in rings) if inward else rings, surface.kind))
-    return Solid(vertices[in_use], tuple(faces))
+    faces = tuple(
+        Face(tuple(ring[::-1] if inward else ring for ring in surface.rings), surface.kind)
+        for surface in read_shell(shell, values, surfaces, len(vertices))
+    )
+    return Solid(vertices, faces).drop_unused_vertices()
 
 
 # CityGML
