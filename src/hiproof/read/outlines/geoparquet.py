@@ -317,31 +317,21 @@ def groups_meeting(file: Any, column: GeometryColumn, extent: shapely.Geometry |
 
     The file's statistics of the boxes decide.
     """
-    groups = range(file.num_row_groups)
+    groups = list(range(file.num_row_groups))
     if extent is None or column.sides is None:
-        return list(groups)
-    leaf_of = {file.schema.column(i).path: i for i in range(len(file.schema))}
-    leaves = [leaf_of.get(".".join(way)) for way in column.sides]
-    if None in leaves:
-        return list(groups)
-    boxes = np.array(
-        [[read_bound(file, i, leaf, k) for k, leaf in enumerate(leaves)] for i in groups]
-    )
-    boxes = boxes.reshape(-1, len(BOX_COLUMNS))
-    unknown = ~np.isfinite(boxes).all(axis=1)
-    met = shapely.intersects(shapely.box(*np.where(unknown[:, None], 0.0, boxes).T), extent)
-    return np.flatnonzero(met | unknown).tolist()
+        return groups
+    from pyarrow import ArrowException, dataset
 
-
-def read_bound(file: Any, group: int, leaf: Any, side: int) -> float:
-    """Return the least or greatest value of a column in a row group.
-
-    It is the least for xmin and ymin, and NaN where the file has no statistics.
-    """
-    told = file.metadata.row_group(group).column(leaf).statistics
-    if told is None or not told.has_min_max:
-        return float("nan")
-    return float(told.min if side < 2 else told.max)
+    footer = io.BytesIO()  # a file of the metadata alone, so that nothing is fetched twice
+    file.metadata.write_metadata_file(footer)
+    fragment = dataset.ParquetFileFormat().make_fragment(footer)
+    low_x, low_y, high_x, high_y = (dataset.field(*way) for way in column.sides)
+    xmin, ymin, xmax, ymax = extent.bounds
+    met = (low_x <= xmax) & (low_y <= ymax) & (high_x >= xmin) & (high_y >= ymin)
+    try:
+        return [group.id for group in fragment.subset(met).row_groups]
+    except ArrowException:  # boxes that are no numbers, which the rows show
+        return groups
 
 
 def rows_meeting(table: Any, column: GeometryColumn, extent: shapely.Geometry | None) -> np.ndarray:
