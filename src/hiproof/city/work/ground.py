@@ -14,7 +14,6 @@ count where the two contradict each other.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
@@ -187,23 +186,6 @@ class LowestAround:
         heights = np.sort(self.cells.select_around(xy, RINGS[-1], self.box)[:, :, 2], axis=1)
         is_many = np.isfinite(heights[:, 9])
         return np.where(is_many, heights[:, 1], heights[:, 0])
-
-
-class WhereSeen:
-    """A terrain that knows nothing unless `is_seen`.
-
-    That is evaluated only where all better terrains do not know.
-    """
-
-    def __init__(self, terrain: Terrain, is_seen: Callable[[], bool]):
-        self.terrain, self.is_seen, self.source = terrain, is_seen, terrain.source
-        self.is_guess = getattr(terrain, "is_guess", False)
-
-    def height_at(self, xy_world: np.ndarray) -> np.ndarray:
-        """Return the terrain's height (n,) at `xy_world` (n, 2), NaN if unknown."""
-        return (
-            self.terrain.height_at(xy_world) if self.is_seen() else np.full(len(xy_world), np.nan)
-        )
 
 
 def fit_planes(position: np.ndarray, cells: np.ndarray) -> np.ndarray:

@@ -56,7 +56,6 @@ from .ground import (
     ModelAround,
     TerrainModel,
     WhereLikeGround,
-    WhereSeen,
     check_terrain,
     ground_cells,
     lowest_in_cells,
@@ -263,7 +262,7 @@ class Surroundings:
         They are those in the whole-metre box around it.
         """
         box = neighbourhood(job, self.plan.terrain_reach_m)
-        bare = WhereSeen(BareAround(self.low, box), lambda: self.has_points_around(job, box))
+        bare = BareAround(self.find_lowest(job, box), box)
         points = GroundAround(self.ground, box)
         if self.model is None:
             return [points, bare]
@@ -271,17 +270,15 @@ class Surroundings:
         far = ModelAround(model, own, FAR_STEP_M, is_guess=True)
         return [model, points, ModelAround(model, own), bare, far]
 
-    def has_points_around(self, job: Job, box: np.ndarray) -> bool:
-        """Return whether anything beside the building is known.
+    def find_lowest(self, job: Job, box: np.ndarray) -> Cells:
+        """Return the cells of lowest points.
 
-        Otherwise the lowest points are the roof's own.
+        Where too few lie beside the building, they are the roof's own, and no cells are returned.
         """
         points = self.low.inside(box)
         outline = grow_polygon(shapely.simplify(job.area, COARSEST_THINNING_M), BESIDE_M)
-        return (
-            int((~shapely.intersects_xy(outline, points[:, 0], points[:, 1])).sum())
-            >= FEWEST_BESIDE
-        )
+        is_beside = ~shapely.intersects_xy(outline, points[:, 0], points[:, 1])
+        return self.low if is_beside.sum() >= FEWEST_BESIDE else Cells(points[:0])
 
     def choose_terrain(self, job: Job) -> TerrainChain | None:
         """Return the terrain around the building.
@@ -291,7 +288,7 @@ class Surroundings:
         if job.area.is_empty:
             return None
         box = neighbourhood(job, self.plan.terrain_reach_m)
-        lowest = WhereSeen(LowestAround(self.low, box), lambda: self.has_points_around(job, box))
+        lowest = LowestAround(self.find_lowest(job, box), box)
         return TerrainChain([*self.find_grounds(job), lowest])
 
     def remark_terrain(self, job: Job) -> str:
