@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Mapping
 from typing import Any
-
-import numpy as np
 
 from ..compose.settle import DIGITS, PLAN_DIGITS, round_number
 from ..errors import InputError
@@ -27,7 +24,6 @@ from ..model.installation import CHIMNEY, ROOF_OBJECT
 from ..model.overhang import ROOF_EDGE, WALLS
 from ..read.models.damage import excerpt
 from ..settings import ComposeSettings, Settings
-from ..write.attribute_list import TABLES
 from .record import (
     figure,
     list_at,
@@ -35,12 +31,11 @@ from .record import (
     number,
     numbers_by_name,
     on_grid,
-    place,
     polygon,
     read_building,
+    read_position,
     refuse_other_keys,
     require_mapping,
-    round_values,
 )
 
 
@@ -64,7 +59,7 @@ def read_underside(record: Mapping[str, Any], building: Building, roof: Roof) ->
 
 def read_passage(record: Any, label: str, z_origin: float) -> Passage:
     """Read a passage; its ceiling is in the world, `z_origin` the height of the frame."""
-    refuse_other_keys(require_mapping(record, label), TABLES["passage"].names, label)
+    refuse_other_keys(record, "passage", label)
     outline = on_grid(polygon(record.get("outline"), f"the outline of {label}"))
     ceiling = measure(record.get("ceiling"), f"the ceiling of {label}")
     return Passage(outline, round_number(ceiling, PLAN_DIGITS) - z_origin)
@@ -100,7 +95,7 @@ def read_eaves(record: Mapping[str, Any], roof: Roof) -> Eaves | None:
 
 def read_overhang(record: Any, label: str, count: int) -> Overhang:
     """Read an overhang at one of `count` edges."""
-    refuse_other_keys(require_mapping(record, label), TABLES["overhang"].names, label)
+    refuse_other_keys(record, "overhang", label)
     edge = record.get("edge")
     if not isinstance(edge, int) or not 0 <= edge < count:
         raise InputError(
@@ -129,7 +124,7 @@ def read_installations(record: Mapping[str, Any]) -> tuple[Installation, ...]:
 
 
 def read_installation(record: Any, label: str) -> Installation:
-    refuse_other_keys(require_mapping(record, label), TABLES["installation"].names, label)
+    refuse_other_keys(record, "installation", label)
     kind = record.get("type")
     if kind not in (CHIMNEY, ROOF_OBJECT):
         raise InputError(
@@ -141,15 +136,9 @@ def read_installation(record: Any, label: str) -> Installation:
             f"expected {', '.join(BOX_SIZES)} over 0 as the parameters of {label}, got "
             f"{excerpt(record.get('parameters'))}"
         )
-    position = place(record.get("position"), f"position of {label}", measure)
-    return Installation(
-        str(kind),
-        round_number(sizes["length"]),
-        round_number(sizes["width"]),
-        round_number(sizes["height"]),
-        math.radians(round_number(number(record.get("rotation", 0.0), f"rotation of {label}"))),
-        np.asarray(round_values(position, DIGITS)),
-    )
+    position, kappa = read_position(record, label)
+    length, width, height = (round_number(sizes[name]) for name in BOX_SIZES)
+    return Installation(str(kind), length, width, height, kappa, position)
 
 
 def build(parameters: Mapping[str, Any], compose: ComposeSettings | None = None) -> Building:

@@ -50,7 +50,7 @@ def read_building(record: Mapping[str, Any]) -> tuple[Building, Roof | None]:
 
     Raises InputError, one sentence, for an object that makes none.
     """
-    refuse_other_keys(record, TABLES["building"].names, "the building")
+    refuse_other_keys(record, "building", "the building")
     parts = list_at(record, "parts")
     origin = None if record.get("origin") is None else place(record["origin"], "origin", coordinate)
     outline = None if record.get("outline") is None else polygon(record["outline"], "outline")
@@ -144,13 +144,12 @@ def read_part(record: Any, outline: shapely.Polygon, label: str) -> Part:
 
     Without outlines of its own it roofs what its rectangle covers of the building's.
     """
-    refuse_other_keys(require_mapping(record, label), TABLES["part"].names, label)
+    refuse_other_keys(record, "part", label)
     kind = text_at(record, "type")
     parameters = numbers_by_name(record.get("parameters") or {}, f"the parameters of {label}")
     refuse_no_shape(kind, parameters, label)
     parameters = {name: round_number(value) for name, value in parameters.items()}
-    position = round_values(place(record.get("position"), f"position of {label}", measure), DIGITS)
-    kappa = math.radians(round_number(number(record.get("rotation", 0.0), f"rotation of {label}")))
+    position, kappa = read_position(record, label)
     outlines = read_part_outlines(record, parameters, position, kappa, outline, label)
     if kind == "shed":
         outlines = by_teeth(outlines, parameters, position, kappa)
@@ -162,6 +161,13 @@ def read_part(record: Any, outline: shapely.Polygon, label: str) -> Part:
         for n, s in sigma.items()
     }
     return Part(kind, pieces, parameters, kappa, position, settled_sigma(sigma))
+
+
+def read_position(record: Mapping[str, Any], label: str) -> tuple[np.ndarray, float]:
+    """Read where a part or an installation lies (3,) about the origin, and its rotation in rad."""
+    position = place(record.get("position"), f"position of {label}", measure)
+    rotation = number(record.get("rotation", 0.0), f"rotation of {label}")
+    return round_values(position, DIGITS), math.radians(round_number(rotation))
 
 
 def read_part_outlines(
@@ -328,7 +334,7 @@ def read_roof_outside(record: Any, label: str) -> dict[str, Any]:
 
 def read_values(record: Any, table: str, label: str) -> dict[str, Any]:
     """Read an object that is kept as it is, with the keys and types of a table."""
-    refuse_other_keys(require_mapping(record, label), TABLES[table].names, label)
+    refuse_other_keys(record, table, label)
     refuse_other_types(record, table, label)
     return dict(record)
 
@@ -394,14 +400,15 @@ def refuse_other_part_kinds(part: Mapping[str, Any], label: str) -> None:
             f"expected a roof type ({', '.join(CATALOGUE)}) in {label}, got "
             f"{excerpt(part.get('type'))}"
         )
-    place(part.get("position"), f"position of {label}", measure)
-    number(part.get("rotation", 0.0), f"rotation of {label}")
+    read_position(part, label)
     for name in ("parameters", "sigma"):
         numbers_by_name(part.get(name) or {}, f"{name} of {label}")
 
 
-def refuse_other_keys(record: Mapping[str, Any], allowed: Any, label: str) -> None:
-    other = [str(key)[:40] for key in record if key not in allowed]
+def refuse_other_keys(record: Any, table: str, label: str) -> None:
+    """Raise InputError for what is no object, or has keys that a table does not declare."""
+    allowed = TABLES[table].names
+    other = [str(key)[:40] for key in require_mapping(record, label) if key not in allowed]
     if other:
         raise InputError(
             f"expected the keys {', '.join(allowed)} of {label}, got also {', '.join(other[:8])}; "
