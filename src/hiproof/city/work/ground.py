@@ -14,6 +14,7 @@ count where the two contradict each other.
 from __future__ import annotations
 
 import functools
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -82,6 +83,7 @@ class Cells:
         return around.reshape(len(xy), -1, 3)
 
 
+@dataclass
 class GroundAround:
     """Terrain for one building: a plane through the known cells around.
 
@@ -90,10 +92,9 @@ class GroundAround:
     Moving least squares (Lancaster and Salkauskas 1981) with weights 1 / (distance^2 + SOFT_M2).
     """
 
+    cells: Cells
+    box: np.ndarray
     source = "ground points"
-
-    def __init__(self, cells: Cells, box: np.ndarray):
-        self.cells, self.box = cells, box
 
     def height_at(self, xy_world: np.ndarray) -> np.ndarray:
         """Return the height (n,) at `xy_world` (n, 2).
@@ -138,16 +139,16 @@ class ModelAround:
         return self.around.height_at(np.asarray(xy_world, float)[:, :2] / self.step_m)
 
 
+@dataclass
 class BareAround:
     """Terrain for one building where no class marks the ground.
 
     It is the lowest cells, without what stands on it.
     """
 
+    cells: Cells
+    box: np.ndarray
     source = "ground found by its shape"
-
-    def __init__(self, cells: Cells, box: np.ndarray):
-        self.cells, self.box = cells, box
 
     @functools.cached_property
     def bare(self) -> GroundAround:
@@ -166,6 +167,7 @@ class BareAround:
         return self.bare.height_at(xy_world)
 
 
+@dataclass
 class LowestAround:
     """The last resort for one building: the lowest known cell around.
 
@@ -175,10 +177,9 @@ class LowestAround:
     ground.
     """
 
+    cells: Cells
+    box: np.ndarray
     source, is_guess = "lowest points around the building", True
-
-    def __init__(self, cells: Cells, box: np.ndarray):
-        self.cells, self.box = cells, box
 
     def height_at(self, xy_world: np.ndarray) -> np.ndarray:
         """Return the height (n,) at `xy_world` (n, 2), NaN where no cell is known."""
