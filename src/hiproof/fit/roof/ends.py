@@ -22,23 +22,23 @@ LEAN_STEP = 0.02  # Steps (rise over run) in which a line leans.
 
 @compiled
 def find_end(roof, k, s, site):
-    """Return a, b, c of the line along which side s of volume k tells most points apart, its units.
+    """Return a, b, c of the line along which side s of volume k tells most points apart.
 
-    All are 0 where points do not say so clearly that it pays. A line that leans from the side has a
-    direction of its own and costs as such, another one what the side does.
+    All are 0 where points do not say so clearly that it pays.
     """
     x, y, length = measure_middle(roof, k, s, site.bounds)
     if length == 0.0:
-        return 0.0, 0.0, 0.0, 0.0
+        return 0.0, 0.0, 0.0
     a, b, c = roof.half_planes[k, s]
     across, along, is_on, step = list_near(roof, k, s, x, y, site)
     count = len(is_on)
     n_on = is_on.sum()
     if n_on < FEWEST or count - n_on < FEWEST:
-        return 0.0, 0.0, 0.0, 0.0
+        return 0.0, 0.0, 0.0
     best, best_lean, best_end = 0, 0.0, 0.0
     for i in range(count):
         best += int(is_on[i] == (across[i] >= 0.0))
+    best += int(LEAN_UNITS * site.unit / step)  # what it costs, if it leans
     is_better, middle = False, 0.0
     for turn in range(2 * LEANS + 3):
         lean = (turn + 1) // 2 * (LEAN_STEP if turn % 2 else -LEAN_STEP)
@@ -46,8 +46,6 @@ def find_end(roof, k, s, site):
             middle = best_lean
         if turn > 2 * LEANS:  # at last, beside the best
             lean = middle + (0.5 if turn % 2 else -0.5) * LEAN_STEP
-        if turn == 1:  # what it costs, if it leans
-            best += int(LEAN_UNITS * site.unit / step)
         places = across - lean * along
         if bound_right(places, is_on, n_on) <= best:
             continue
@@ -59,13 +57,12 @@ def find_end(roof, k, s, site):
                 best, best_lean, is_better = right, lean, True
                 best_end = 0.5 * (places[order[i]] + places[order[i + 1]])
     if not is_better:
-        return 0.0, 0.0, 0.0, 0.0
+        return 0.0, 0.0, 0.0
     # across - lean * along = end, with along = b (x - x0) - a (y - y0) in plan
     d, e = a - best_lean * b, b + best_lean * a
     norm = np.sqrt(d * d + e * e)
     f = c - best_end + best_lean * (b * x - a * y)
-    units = roof.lines[abs(roof.sides[k, s]) - 1, 3] if best_lean == 0.0 else LEAN_UNITS
-    return d / norm, e / norm, f / norm, units
+    return d / norm, e / norm, f / norm
 
 
 @compiled

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...compiled import compiled
+from ..prices import LEAN_UNITS
 from .draw import is_near
 from .ends import find_end
 from .tables import (
@@ -381,10 +382,10 @@ def apply_move(roof, move, site, changed):
             roof.plane_lines[a, b], roof.heights[a, b] = roof.plane_lines[c, d], roof.heights[c, d]
             roof.slopes[a, b] = roof.slopes[c, d]
     elif kind == TO_POINTS:
-        d, e, f, units = find_end(roof, a, b, site)
+        d, e, f = find_end(roof, a, b, site)
         is_possible = d != 0.0 or e != 0.0
         if is_possible:
-            roof.sides[a, b] = add_line(roof, d, e, f, units)
+            roof.sides[a, b] = add_line(roof, d, e, f, LEAN_UNITS)
     elif kind == COVER:
         roof.sides[a, b] = find_new_side(roof, TO_OUTLINE, a, b, c, site)
         place_volume(roof, a)
