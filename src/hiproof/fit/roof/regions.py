@@ -7,7 +7,7 @@ import shapely
 
 from ...geometry.rings import OVERLAY_GRID_M, with_area
 from ..shapes.clamp import clip_ring
-from ..shapes.regions import find_neighbour, list_polygons, merge_inside, widen_gap
+from ..shapes.regions import find_neighbour, list_polygons, widen_gap
 from .draw import Drawing, join_fragments
 from .tables import FAR_M, N_SIDES, VOLUME_COUNT, Tables
 
@@ -137,11 +137,14 @@ def draw_regions(roof: Tables, outline: shapely.Polygon) -> list[list[shapely.Po
     bare = shapely.difference(
         outline, shapely.union_all(quads, grid_size=OVERLAY_GRID_M), grid_size=OVERLAY_GRID_M
     )
-    for gap in list_polygons(bare):
-        wide_gap = widen_gap(gap)
-        k, q = find_neighbour(wide_gap, lists)
+    gaps: dict[tuple[int, int], list[shapely.Polygon]] = {}
+    for gap in map(widen_gap, list_polygons(bare)):
+        gaps.setdefault(find_neighbour(gap, lists), []).append(gap)
+    for k, q in sorted(gaps, reverse=True):  # the last polygon first: the others stay in place
         if lists[k]:
-            lists[k][q : q + 1] = merge_inside(lists[k][q], wide_gap, outline)
+            wider = shapely.union_all([lists[k][q], *gaps[k, q]], grid_size=OVERLAY_GRID_M)
+            inside = shapely.intersection(with_area(wider), outline, grid_size=OVERLAY_GRID_M)
+            lists[k][q : q + 1] = list_polygons(inside)
     return lists
 
 

@@ -46,14 +46,6 @@ def widen_gap(gap: shapely.Polygon) -> shapely.Polygon:
     return shapely.buffer(gap, 1e-3, quad_segs=1)
 
 
-def merge_inside(
-    polygon: shapely.Polygon, wide_gap: shapely.Polygon, outline: shapely.Polygon
-) -> list[shapely.Polygon]:
-    """Return what two polygons cover together of an outline."""
-    wider = with_area(shapely.union_all([polygon, wide_gap], grid_size=OVERLAY_GRID_M))
-    return list_polygons(shapely.intersection(wider, outline, grid_size=OVERLAY_GRID_M))
-
-
 def find_neighbour(
     wide_gap: shapely.Polygon, polygons: list[list[shapely.Polygon]]
 ) -> tuple[int, int]:
