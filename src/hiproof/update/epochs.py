@@ -163,8 +163,8 @@ def find_ground(surroundings: Surroundings, job: Job) -> np.ndarray:
 def compare_ground(ground: np.ndarray, new: Surroundings, job: Job) -> np.ndarray:
     """Return places of the ground, how much higher it lies now, and its slope (m, 5).
 
-    `ground` (n, 3) is the earlier one. The terrain model of an update is
-    that of no survey, so it does not count.
+    `ground` (n, 3) is the earlier one. The terrain model of an update is that of no survey, so it
+    does not count.
     """
     rise = TerrainChain(new.without_model().find_grounds(job)).height_at(ground) - ground[:, 2]
     known = np.isfinite(rise)

@@ -225,12 +225,12 @@ def register_surveys(samples: Iterable[SampledRoof], read: ReadSettings) -> Surv
     rows = [rows for _, rows in pairs]
     ground = measure_ground(samples)
     heights = [float(np.median(residuals)) for _, residuals in rows]
-    shift, sigma = np.zeros(3) if fixed is None else np.array(fixed), np.zeros(3)
-    for _ in range(GROUND_ROUNDS):
-        level = float(np.median(ground[:, 2] + ground[:, 3:] @ shift[:2])) if len(ground) else 0.0
-        if fixed is None:
-            start = level if len(ground) else float(np.median(heights))
-            shift, sigma = solve_shift(rows, start, bool(len(ground)))
+    if fixed is not None:
+        shift, sigma, level = np.array(fixed), np.zeros(3), measure_level(ground, np.array(fixed))
+    elif len(ground):
+        shift, sigma, level = solve_with_ground(rows, ground)
+    else:
+        shift, sigma, level = *solve_shift(rows, float(np.median(heights)), False), 0.0
     ground[:, 2] += ground[:, 3:] @ shift[:2]
     offsets = np.array([np.median(residuals - design @ shift) for design, residuals in rows])
     is_agreeing = np.abs(offsets) < SHIFT_SCALES_M[-1]
@@ -256,6 +256,28 @@ def register_surveys(samples: Iterable[SampledRoof], read: ReadSettings) -> Surv
     noise = measure_noise(unchanged)
     tilted = max(noise.roof, round(result.tilt / math.sqrt(12), 4))  # of evenly spread places
     return dataclasses.replace(result, noise=dataclasses.replace(noise, roof=tilted))
+
+
+def solve_with_ground(
+    rows: list[tuple[np.ndarray, np.ndarray]], ground: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Solve for the shift whose height is that of the `ground` (n, 5).
+
+    Returns it, its standard deviations, and the height.
+    """
+    shift = np.zeros(3)
+    for _ in range(GROUND_ROUNDS):
+        level = measure_level(ground, shift)
+        shift, sigma = solve_shift(rows, level, True)
+    return shift, sigma, level
+
+
+def measure_level(ground: np.ndarray, shift: np.ndarray) -> float:
+    """Return how much higher the new ground lies (n, 5), 0 without any.
+
+    What slopes show of a `shift` aside is taken off.
+    """
+    return float(np.median(ground[:, 2] + ground[:, 3:] @ shift[:2])) if len(ground) else 0.0
 
 
 def measure_ground(samples: list[SampledRoof]) -> np.ndarray:

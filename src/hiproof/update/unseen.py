@@ -12,6 +12,7 @@ import math
 import numpy as np
 import shapely
 
+from ..geometry.grid import number_cells
 from ..model import Roof
 from ..status import ChangeKind
 from .cells import CellComparison, predict_occupancy, shrink_outline
@@ -58,5 +59,6 @@ def list_empty(roof: Roof, comparison: CellComparison) -> np.ndarray:
     x0, y0, x1, y1 = np.floor(np.array(inner.bounds) / side).astype(np.int64).tolist()
     cells = np.mgrid[x0 : x1 + 1, y0 : y1 + 1].reshape(2, -1).T
     cells = cells[shapely.intersects_xy(inner, *((cells + 0.5) * side).T)]
-    seen = set(map(tuple, comparison.cells.tolist()))
-    return cells[[tuple(cell) not in seen for cell in cells.tolist()]]
+    _, number = number_cells(np.concatenate([comparison.cells, cells]))
+    n_known = len(comparison.cells)
+    return cells[~np.isin(number[n_known:], number[:n_known])]

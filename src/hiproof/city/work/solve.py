@@ -256,19 +256,23 @@ class Surroundings:
         own = neighbourhood(job, 0.0)
         return TerrainChain([self.model, ModelAround(self.model, own)] if self.model else [])
 
-    def find_grounds(self, job: Job) -> list[Terrain | None]:
-        """Return the terrain model, ground points and ground of a building.
+    def find_grounds(self, job: Job) -> list[Terrain]:
+        """Return the terrain model, ground points and ground of a building."""
+        return self.list_terrains(job)[:-1]
+
+    def list_terrains(self, job: Job) -> list[Terrain]:
+        """Return the terrains of a building, the best first and its lowest points last.
 
         They are those in the whole-metre box around it.
         """
         box = neighbourhood(job, self.plan.terrain_reach_m)
-        bare = BareAround(self.find_lowest(job, box), box)
-        points = GroundAround(self.ground, box)
+        low, points = self.find_lowest(job, box), GroundAround(self.ground, box)
+        bare, lowest = BareAround(low, box), LowestAround(low, box)
         if self.model is None:
-            return [points, bare]
+            return [points, bare, lowest]
         model, own = WhereLikeGround(self.model, points), neighbourhood(job, 0.0)
         far = ModelAround(model, own, FAR_STEP_M, is_guess=True)
-        return [model, points, ModelAround(model, own), bare, far]
+        return [model, points, ModelAround(model, own), bare, far, lowest]
 
     def find_lowest(self, job: Job, box: np.ndarray) -> Cells:
         """Return the cells of lowest points.
@@ -281,15 +285,8 @@ class Surroundings:
         return self.low if is_beside.sum() >= FEWEST_BESIDE else Cells(points[:0])
 
     def choose_terrain(self, job: Job) -> TerrainChain | None:
-        """Return the terrain around the building.
-
-        It is that of `find_grounds`, else the lowest points.
-        """
-        if job.area.is_empty:
-            return None
-        box = neighbourhood(job, self.plan.terrain_reach_m)
-        lowest = LowestAround(self.find_lowest(job, box), box)
-        return TerrainChain([*self.find_grounds(job), lowest])
+        """Return the terrain around the building: its ground, else the lowest points."""
+        return None if job.area.is_empty else TerrainChain(self.list_terrains(job))
 
     def remark_terrain(self, job: Job) -> str:
         """Return a remark where the terrain model contradicts ground points.

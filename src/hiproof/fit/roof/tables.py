@@ -197,13 +197,6 @@ def place_volume(roof, k):
 
 
 @compiled
-def place_volumes(roof):
-    """Compute what follows from the tables."""
-    for k in range(roof.counts[VOLUME_COUNT]):
-        place_volume(roof, k)
-
-
-@compiled
 def measure_middle(roof, k, s, box):
     """Return x, y of the middle of side s of volume k within a box, and its length."""
     t = 2 if s < 2 else 0
