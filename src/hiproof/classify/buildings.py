@@ -79,7 +79,10 @@ class SquareSearch:
         self.classes = np.full(len(xyz), UNKNOWN, np.uint8)
         self.squares, self.searched = find_squares(xyz), set[Square]()
         if len(xyz):
-            self.grid, self.cell_m = PointGrid(xyz, 10.0), choose_cell_size(xyz)
+            density = plan_density(xyz)
+            # the smallest cells that most often hold a point where there are any
+            cells = (cell for cell in CELLS_M if density * cell**2 >= 1.0)
+            self.grid, self.cell_m = PointGrid(xyz, 10.0), next(cells, CELLS_M[-1])
 
     def classify(
         self, squares: set[Square], progress: Callable[[int, int], None] = lambda *_: None
@@ -114,15 +117,6 @@ def list_squares(box: Box, reach_m: float) -> set[Square]:
     lower = np.floor((np.array(box[:2]) - reach_m) / WORK_M).astype(int)
     upper = np.floor((np.array(box[2:]) + reach_m) / WORK_M).astype(int) + 1
     return set(itertools.product(range(lower[0], upper[0]), range(lower[1], upper[1])))
-
-
-def choose_cell_size(xyz: np.ndarray) -> float:
-    """Return the side of the cells from which buildings are put together.
-
-    It is the smallest that most often holds a point where there are any.
-    """
-    density = plan_density(xyz)
-    return next((cell for cell in CELLS_M if density * cell**2 >= 1.0), CELLS_M[-1])
 
 
 def classify_points(xyz: np.ndarray, cell_m: float) -> np.ndarray:

@@ -149,7 +149,10 @@ def separate_houses(
     """
     origin = np.floor(xyz.min(axis=0))
     surfaces = find_surfaces(xyz - origin)
-    roofs, bonds = find_roofs(surfaces), find_bonds(surfaces)
+    roof = is_roof(surfaces)
+    normal = surfaces.normal[roof]
+    roofs = Roofs(surfaces.xyz[roof, :2], surfaces.own_m2[roof] * np.abs(normal[:, 2]), normal)
+    bonds = find_bonds(surfaces)
     houses = [
         with_area(shapely.intersection(house, block))
         for block in without_necks(
@@ -210,12 +213,6 @@ class Roofs(NamedTuple):
     xy: np.ndarray
     m2: np.ndarray
     normal: np.ndarray
-
-
-def find_roofs(surfaces: Surfaces) -> Roofs:
-    roof = is_roof(surfaces)
-    normal = surfaces.normal[roof]
-    return Roofs(surfaces.xyz[roof, :2], surfaces.own_m2[roof] * np.abs(normal[:, 2]), normal)
 
 
 def roof_m2(area: shapely.Geometry, roofs: Roofs) -> float:

@@ -53,7 +53,15 @@ class Command(click.Command):
         arguments = groups.pop("Arguments", [])
         write_parameters(formatter, "Arguments", arguments, ctx)
         write_parameters(formatter, MAIN_HEADING, shown, ctx)
-        write_groups(formatter, groups, shown, row.get("more", ""))
+        more = row.get("more", "")
+        names = {param.name for param in shown}
+        lines = [
+            heading.removeprefix("Settings: ") if ":" in heading else more
+            for heading, group in groups.items()
+            if {param.name for param in group} - names
+        ]
+        with formatter.section("More options, explained by --help-all"):
+            formatter.write("".join(f"  {line}\n" for line in dict.fromkeys(filter(None, lines))))
 
     def format_epilog(self, ctx: Any, formatter: Any) -> None:
         write_example(formatter, self.name or "")
@@ -75,31 +83,12 @@ def write_parameters(formatter: Any, heading: str, params: Iterable[Any], ctx: A
     """
     records = filter(None, [param.get_help_record(ctx) for param in params])
     with formatter.section(heading):
-        formatter.write_dl([(name, make_phrase(text)) for name, text in records])
-
-
-def write_groups(formatter: Any, groups: dict[str, list[Any]], shown: list[Any], more: str) -> None:
-    """Write a line for each group of options that are not all `shown`.
-
-    `more` describes those that are no settings.
-    """
-    names = {param.name for param in shown}
-    lines = [
-        heading.removeprefix("Settings: ") if ":" in heading else more
-        for heading, group in groups.items()
-        if {param.name for param in group} - names
-    ]
-    with formatter.section("More options, explained by --help-all"):
-        formatter.write("".join(f"  {line}\n" for line in dict.fromkeys(filter(None, lines))))
-
-
-def make_phrase(text: str) -> str:
-    """Turn a sentence into a phrase.
-
-    >>> make_phrase("Show this message and exit."), make_phrase("CRS of the clouds")
-    ('show this message and exit', 'CRS of the clouds')
-    """
-    return text[:1].lower() + text[1:-1] if text.endswith(".") else text
+        formatter.write_dl(
+            [
+                (name, text[:1].lower() + text[1:-1] if text.endswith(".") else text)
+                for name, text in records
+            ]
+        )
 
 
 def write_example(formatter: Any, command: str) -> None:

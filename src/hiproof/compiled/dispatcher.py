@@ -131,7 +131,8 @@ class Dispatcher(CPUDispatcher):
         finally:
             callees = tuple(CALLS.pop())
         result = self.overloads[args]
-        is_large = count_instructions(result) >= LARGE
+        function = result.library.get_function(result.fndesc.mangled_name)
+        is_large = sum(1 for block in function.blocks for _ in block.instructions) >= LARGE
         self.targetctx.remove_user_function(result.entry_point)
         self.insert(result, is_large, callees)
         if not result.library.has_dynamic_globals:  # addresses of this process: not to be kept
@@ -202,9 +203,3 @@ class Dispatcher(CPUDispatcher):
             code = library.serialize_using_object_code()
             self.kept.write("-python", self.key(args), environment.consts, code)
         return entry
-
-
-def count_instructions(result: Any) -> int:
-    """Count the instructions of a compiled function."""
-    function = result.library.get_function(result.fndesc.mangled_name)
-    return sum(1 for block in function.blocks for _ in block.instructions)

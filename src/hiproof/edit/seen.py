@@ -29,6 +29,7 @@ def describe_building(building: Building, points: np.ndarray) -> dict[str, Any]:
     parts = building_record(building)["parts"]
     roof = building.roof
     local = roof.frame.to_local(points)
+    quality = dataclasses.asdict(building.quality)
     return {
         "parts": parts,
         "origin": roof.frame.origin.tolist(),
@@ -36,7 +37,12 @@ def describe_building(building: Building, points: np.ndarray) -> dict[str, Any]:
         "type": building.type,
         "status": building.status.code,
         "detail": building.detail,
-        "figures": list_figures(building),
+        "figures": {
+            **{name: number(quality[name], 4) for name in PAGE_FIGURES},
+            "volume_m3": number(building.solid.volume, 1),
+            "ridge_height": number(building.solid.vertices[:, 2].max(), 3),
+            "z_ground": number(building.z_ground, 3),
+        },
         "mesh": make_mesh(building),
         "gaps": pack_values(
             np.nan_to_num(local[:, 2] - roof.height_at(local[:, :2]), nan=9.0), "<f4"
@@ -72,17 +78,6 @@ def place_handles(part: dict[str, Any]) -> dict[str, Any]:
         "length": length,
         "eave": z,
         "ridge": z + rise,
-    }
-
-
-def list_figures(building: Building) -> dict[str, float | None]:
-    """Return the numbers under the model, null where they are unknown."""
-    quality = dataclasses.asdict(building.quality)
-    return {
-        **{name: number(quality[name], 4) for name in PAGE_FIGURES},
-        "volume_m3": number(building.solid.volume, 1),
-        "ridge_height": number(building.solid.vertices[:, 2].max(), 3),
-        "z_ground": number(building.z_ground, 3),
     }
 
 

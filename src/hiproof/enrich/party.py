@@ -40,10 +40,6 @@ class Contact(NamedTuple):
     regions: tuple[shapely.Geometry, shapely.Geometry]
     area_m2: float
 
-    def swap(self) -> Contact:
-        """Return the contact as the other building has it."""
-        return Contact(self.walls[::-1], self.regions[::-1], self.area_m2)
-
 
 def find_contacts(
     walls: tuple[Wall, ...], others: tuple[Wall, ...], touch_m: float = PARTY_GAP_M
@@ -52,22 +48,17 @@ def find_contacts(
     if not walls or not others:
         return ()
     facing = direction_table(walls) @ direction_table(others).T <= -COS_MOST_ANGLE
-    near = boxes_meet(walls, others, touch_m)
+    (low, high), (other_low, other_high) = box_table(walls), box_table(others)
+    reach = np.array([touch_m, touch_m, 0.0])
+    near = (
+        (low[:, None] - reach <= other_high[None]) & (other_low[None] <= high[:, None] + reach)
+    ).all(axis=2)
     pairs = (touch(walls[i], others[k], touch_m) for i, k in np.argwhere(facing & near).tolist())
     return tuple(contact for contact in pairs if contact is not None)
 
 
 def direction_table(walls: tuple[Wall, ...]) -> np.ndarray:
     return np.array([wall.along for wall in walls])
-
-
-def boxes_meet(walls: tuple[Wall, ...], others: tuple[Wall, ...], touch_m: float) -> np.ndarray:
-    """Return whether the boxes of walls meet (n, m), in plan and height."""
-    (low, high), (other_low, other_high) = box_table(walls), box_table(others)
-    reach = np.array([touch_m, touch_m, 0.0])
-    return (
-        (low[:, None] - reach <= other_high[None]) & (other_low[None] <= high[:, None] + reach)
-    ).all(axis=2)
 
 
 def box_table(walls: tuple[Wall, ...]) -> tuple[np.ndarray, np.ndarray]:
@@ -166,7 +157,10 @@ class Town:
             if number < other:
                 contacts = self.list_pair(number, other)
             else:
-                contacts = tuple(contact.swap() for contact in self.list_pair(other, number))
+                contacts = tuple(
+                    Contact(contact.walls[::-1], contact.regions[::-1], contact.area_m2)
+                    for contact in self.list_pair(other, number)
+                )
             if contacts:
                 result[other] = contacts
         return result

@@ -28,7 +28,7 @@ from ..formats import FORMATS, import_format, list_requested_files, requested_fr
 from ..log import LOGGER
 from ..masking import masked_values
 from ..model import Building
-from ..settings import EnrichSettings, Settings, WriteSettings
+from ..settings import EnrichSettings, Settings
 from ..status import Status
 from ..write.attribute_list import OWN
 from ..write.building_attributes import building_attributes, measure_figures
@@ -63,11 +63,6 @@ class EnrichFailure(NamedTuple):
     is_internal: bool
 
 
-def list_kinds(write: WriteSettings) -> list[str]:
-    """Return the modules that make a building's part of the enriched files."""
-    return [kind for kind in requested_fragments(write) if kind not in NOT_MADE]
-
-
 def make_fragments(
     town: Town,
     number: int,
@@ -95,7 +90,11 @@ def make_fragments(
     )
     if settings.energy_ade:
         sheet = dataclasses.replace(sheet, extension=write_energy(sheet))
-    texts = {kind: import_format(kind).fragment(sheet) for kind in list_kinds(head.write)}
+    texts = {
+        kind: import_format(kind).fragment(sheet)
+        for kind in requested_fragments(head.write)
+        if kind not in NOT_MADE
+    }
     return {**texts, FAILURE: Fragment(json.dumps(failure).encode() if failure else b"")}
 
 
@@ -121,12 +120,6 @@ def leave(building: Building, reason: str, is_internal: bool) -> tuple[Answers, 
     """Return a building as it was, with the reason why it has no answers."""
     failure = EnrichFailure(plain_text(building.id), reason, is_internal)
     return Answers(building, {f"{OWN}not_enriched": reason}, {}), failure
-
-
-def read_failure(fragments: Fragments) -> EnrichFailure | None:
-    """Return the failure of a building by its fragments, None where it has answers."""
-    text = fragments[FAILURE].text
-    return EnrichFailure(*json.loads(text)) if text else None
 
 
 BLOCK_BUILDINGS = 64  # buildings of a task: a second of work
@@ -218,7 +211,13 @@ def make_waiting_folder(out: Path, parameters: Path, settings: EnrichSettings) -
     """Make the hidden folder of the blocks of a request; those of others are removed."""
     state = parameters.stat()
     request = [__version__, str(parameters), state.st_size, state.st_mtime_ns]
-    request += [settings_mark(settings)]
+    values = list(dataclasses.astuple(settings))
+    paths = [
+        Path(getattr(settings, declared.name))
+        for declared in dataclasses.fields(settings)
+        if declared.metadata["names"] == "files"
+    ]
+    request += [values + [path.stat().st_mtime_ns for path in paths if path.is_file()]]
     key = hashlib.sha256(json.dumps(request).encode()).hexdigest()[:16]
     waiting = out / WAITING / key
     if waiting.parent.is_dir():
@@ -232,17 +231,6 @@ def make_waiting_folder(out: Path, parameters: Path, settings: EnrichSettings) -
             f"expected to write into {out}, got: {error}; choose another --out"
         ) from error
     return waiting
-
-
-def settings_mark(settings: EnrichSettings) -> list[Any]:
-    """Return settings for JSON, with the time of the files that they name."""
-    values = list(dataclasses.astuple(settings))
-    paths = [
-        Path(getattr(settings, declared.name))
-        for declared in dataclasses.fields(settings)
-        if declared.metadata["names"] == "files"
-    ]
-    return values + [path.stat().st_mtime_ns for path in paths if path.is_file()]
 
 
 def list_blocks(waiting: Path, total: int) -> list[tuple[Path, int, int]]:
@@ -311,7 +299,9 @@ def join_blocks(
     def read_blocks() -> Iterator[Fragments]:
         for path, _, _ in blocks:
             for fragments in load_fragments(path):
-                failures.extend(filter(None, [read_failure(fragments)]))
+                text = fragments[FAILURE].text
+                if text:
+                    failures.append(EnrichFailure(*json.loads(text)))
                 yield fragments
 
     join_fragments(files, read_blocks(), head)

@@ -195,7 +195,8 @@ def summarise(figures: Sequence[BuildingFigures]) -> dict[str, dict[str, Any]]:
 def column_summaries(figures: Sequence[BuildingFigures]) -> dict[str, dict[str, float]]:
     rows = [f.row() for f in figures]
     summaries = {}
-    for name in figure_names(rows):
+    names = dict.fromkeys(name for row in sorted(rows, key=len, reverse=True) for name in row)
+    for name in [name for name in names if name not in TEXT_COLUMNS]:
         values = np.array([row.get(name, np.nan) for row in rows], float)
         values = values[np.isfinite(values)]
         if len(values):
@@ -206,12 +207,6 @@ def column_summaries(figures: Sequence[BuildingFigures]) -> dict[str, dict[str, 
                 "p90": round_value(upper),
             }
     return summaries
-
-
-def figure_names(rows: Sequence[dict[str, Any]]) -> list[str]:
-    """Return the numeric columns, in the order of the fullest row."""
-    names = dict.fromkeys(name for row in sorted(rows, key=len, reverse=True) for name in row)
-    return [name for name in names if name not in TEXT_COLUMNS]
 
 
 def to_csv(figures: Sequence[BuildingFigures]) -> str:

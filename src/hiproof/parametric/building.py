@@ -114,15 +114,6 @@ def read_overhang(record: Any, label: str, count: int) -> Overhang:
 BOX_SIZES = ("length", "width", "height")
 
 
-def read_installations(record: Mapping[str, Any]) -> tuple[Installation, ...]:
-    """Read the installations of a building's object.
-
-    Raises InputError for one that makes no box.
-    """
-    items = list_at(record, "installations")
-    return tuple(read_installation(item, f"installation {k}") for k, item in enumerate(items))
-
-
 def read_installation(record: Any, label: str) -> Installation:
     refuse_other_keys(record, "installation", label)
     kind = record.get("type")
@@ -163,7 +154,9 @@ def build(parameters: Mapping[str, Any], compose: ComposeSettings | None = None)
         return building
     underside = read_underside(parameters, building, roof)
     result = with_model(building, roof, compose, underside)
-    installations, eaves = read_installations(parameters), read_eaves(parameters, roof)
+    items = list_at(parameters, "installations")
+    installations = tuple(read_installation(x, f"installation {k}") for k, x in enumerate(items))
+    eaves = read_eaves(parameters, roof)
     if not installations and eaves is None:
         return result
     model = dataclasses.replace(result.model, installations=installations)

@@ -41,7 +41,10 @@ def changed_part(part: dict[str, Any], change: dict[str, Any], z_origin: float) 
     part = {key: value for key, value in part.items() if key != "sigma"}
     kind = change.pop("type", part["type"])
     if kind != part["type"]:
-        part = change_type(with_sizes(part), kind, read_sizes(change))
+        sizes = {name: measure(change[name], name) for name in PLAN_SIZES if name in change}
+        # Sizes that make no rectangle are left to be refused with the whole part.
+        sizes = {name: size for name, size in sizes.items() if size > 0.0}
+        part = change_type(with_sizes(part), kind, sizes)
     ridge, eave = (
         measure(change.pop(name), name) if name in change else None
         for name in ("ridge_height", "eave_height")
@@ -106,15 +109,6 @@ def make_polygon(rings: list[Any]) -> shapely.Geometry:
     A spike without width has no area.
     """
     return repair_polygons(shapely.Polygon(rings[0], rings[1:]))
-
-
-def read_sizes(change: dict[str, Any]) -> dict[str, float]:
-    """Read the width and length of a change.
-
-    Sizes that make no rectangle are left to be refused with the whole part.
-    """
-    sizes = {name: measure(change[name], name) for name in PLAN_SIZES if name in change}
-    return {name: size for name, size in sizes.items() if size > 0.0}
 
 
 def change_type(part: dict[str, Any], kind: str, sizes: dict[str, float]) -> dict[str, Any]:

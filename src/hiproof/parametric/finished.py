@@ -170,7 +170,12 @@ def make_building(model: BuildingModel) -> Building:
         return Building(model.id, status, attributes=attributes)
     named = name_faces(model.solid)
     types = [model.part_types.get(k, model.roof_type) for k in list_parts(named)]
-    solid = number_parts(named)
+    number = {part: k for k, part in enumerate(list_parts(named))}
+    faces = (
+        dataclasses.replace(face, part=number[face.part] if face.kind == ROOF else -1)
+        for face in named.faces
+    )
+    solid = dataclasses.replace(named, faces=tuple(faces))
     roof, z_ground = trace_roof(solid, types), float(solid.vertices[:, 2].min())
     built = Model(roof, solid, ComposeSettings())
     return Building(model.id, status, built=built, z_ground=z_ground, attributes=attributes)
@@ -196,16 +201,6 @@ def name_faces(solid: Solid) -> Solid:
 
 def list_parts(solid: Solid) -> list[int]:
     return sorted({face.part for face in solid.select_faces(ROOF)})
-
-
-def number_parts(solid: Solid) -> Solid:
-    """Number the parts of a solid's roof from 0 on, without gaps."""
-    number = {part: k for k, part in enumerate(list_parts(solid))}
-    faces = (
-        dataclasses.replace(face, part=number[face.part] if face.kind == ROOF else -1)
-        for face in solid.faces
-    )
-    return dataclasses.replace(solid, faces=tuple(faces))
 
 
 def trace_roof(solid: Solid, types: list[str]) -> Roof:

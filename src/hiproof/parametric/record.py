@@ -60,12 +60,18 @@ def read_building(record: Mapping[str, Any]) -> tuple[Building, Roof | None]:
     ground = (
         figure(record, "z_ground") if roof is None else measure(record.get("z_ground"), "z_ground")
     )
+    code, by_code = text_at(record, "quality"), {grade.code: grade for grade in Grade}
+    if code and code not in by_code:
+        raise InputError(
+            f"expected a quality ({', '.join(by_code)}), got {code!r:.40}; leave it as the run "
+            "wrote it"
+        )
     building = Building(
         id=str(record["id"]),
         status=status,
         detail=text_at(record, "detail") if status.code == record.get("status") else "",
         quality=read_quality(record),
-        grade=read_grade(record),
+        grade=by_code.get(code),
         z_ground=round_number(ground, PLAN_DIGITS),
         ground_source=text_at(record, "ground_source"),
         terrain_intersection=tuple(read_terrain_lines(record)),
@@ -266,17 +272,6 @@ def read_places(rows: list[Any], label: str) -> np.ndarray:
     return np.array([place(row, label) for row in rows])
 
 
-def read_grade(record: Mapping[str, Any]) -> Grade | None:
-    """Read the grade, None where there is none."""
-    code, by_code = text_at(record, "quality"), {grade.code: grade for grade in Grade}
-    if code and code not in by_code:
-        raise InputError(
-            f"expected a quality ({', '.join(by_code)}), got {code!r:.40}; leave it as the run "
-            "wrote it"
-        )
-    return by_code.get(code)
-
-
 def read_change(record: Mapping[str, Any]) -> dict[str, Any] | None:
     """Read what the last update found, None where there is nothing."""
     if record.get("change") is None:
@@ -390,19 +385,15 @@ def refuse_other_kinds(record: Mapping[str, Any]) -> None:
     refuse_other_types(record, "building")
     read_quality(record)
     for index, part in enumerate(parts):
-        refuse_other_part_kinds(part, f"part {index}")
-
-
-def refuse_other_part_kinds(part: Mapping[str, Any], label: str) -> None:
-    """Raise InputError where a value of a part is of another kind than a run writes."""
-    if text_at(part, "type") not in CATALOGUE:
-        raise InputError(
-            f"expected a roof type ({', '.join(CATALOGUE)}) in {label}, got "
-            f"{excerpt(part.get('type'))}"
-        )
-    read_position(part, label)
-    for name in ("parameters", "sigma"):
-        numbers_by_name(part.get(name) or {}, f"{name} of {label}")
+        label = f"part {index}"
+        if text_at(part, "type") not in CATALOGUE:
+            raise InputError(
+                f"expected a roof type ({', '.join(CATALOGUE)}) in {label}, got "
+                f"{excerpt(part.get('type'))}"
+            )
+        read_position(part, label)
+        for name in ("parameters", "sigma"):
+            numbers_by_name(part.get(name) or {}, f"{name} of {label}")
 
 
 def refuse_other_keys(record: Any, table: str, label: str) -> None:

@@ -103,7 +103,11 @@ def refit_parts(
         )
     if not unknowns.names:
         return parts
-    values, sigma = fit_unknowns(roof.parts, off_the_walls(points, roof.outline), unknowns)
+    inner = shapely.buffer(roof.outline, -FACADE_M)
+    selection = points[shapely.intersects_xy(inner, points[:, 0], points[:, 1])]
+    values, sigma = fit_unknowns(
+        roof.parts, selection if len(selection) >= ENOUGH else points, unknowns
+    )
     return [
         with_values(
             part,
@@ -112,16 +116,6 @@ def refit_parts(
         )
         for index, part in enumerate(parts)
     ]
-
-
-def off_the_walls(points: np.ndarray, outline: shapely.Polygon) -> np.ndarray:
-    """Return the points (n, 3) that are no returns of walls.
-
-    Returns all points where too few are left.
-    """
-    inner = shapely.buffer(outline, -FACADE_M)
-    selection = points[shapely.intersects_xy(inner, points[:, 0], points[:, 1])]
-    return selection if len(selection) >= ENOUGH else points
 
 
 def list_unknowns(parts: tuple[Part, ...], fixed: Mapping[int, Collection[str]]) -> Unknowns:

@@ -111,7 +111,8 @@ def build_file(
         maker = Maker(dataclasses.replace(head, write=settings.write, offset=offset))
         first = next(records, None)
         records = iter(()) if first is None else chain([first], records)
-        maker.settle_offset(first)
+        if maker.head.offset is None:
+            maker.head = dataclasses.replace(maker.head, offset=offset_by(first, maker.head.units))
         join_fragments(
             list_requested_files(settings, out),
             make_fragments(maker, records, built, progress),
@@ -138,14 +139,6 @@ class Maker:
     def __init__(self, head: FileHead) -> None:
         self.head = head
         self.names = UniqueNames(), UniqueNames()
-
-    def settle_offset(self, first: Mapping[str, Any] | None) -> None:
-        """Set the offset of the CityJSON file by the first building.
-
-        It is only set where the head names none.
-        """
-        if self.head.offset is None:
-            self.head = dataclasses.replace(self.head, offset=offset_by(first, self.head.units))
 
     def make(self, record: dict[str, Any]) -> tuple[Building, Fragments]:
         """Return the building of an object, and its texts.

@@ -99,7 +99,7 @@ def make_shape(key: str, constants: Mapping[str, Any] | None = None, **changes: 
     def draw(rng: np.random.Generator, width: float) -> dict[str, float]:
         chances = {
             "uniform": lambda start, end: float(rng.uniform(start, end)),
-            "slope": lambda start, end: draw_slope(rng, start, end),
+            "slope": lambda start, end: math.tan(math.radians(rng.uniform(start, end))),
             "integers": lambda start, end: float(rng.integers(start, end)),
             "random": rng.random,
         }
@@ -170,8 +170,3 @@ def name_member(member: Any) -> dict[str, Any]:
     for side, slope, eave in zip(SIDES, member.slopes, member.eaves, strict=True):
         names |= {side: slope, f"{side}_eave": eave}
     return names
-
-
-def draw_slope(rng: np.random.Generator, low_deg: float, high_deg: float) -> float:
-    """Draw a slope (rise by run) whose angle lies between two, in degrees."""
-    return math.tan(math.radians(rng.uniform(low_deg, high_deg)))

@@ -128,25 +128,19 @@ def segment(points: np.ndarray, settings: Settings | None = None) -> Segmentatio
     model = load(settings.segment.weights or str(SHIPPED_WEIGHTS), settings.segment.device)
     arranged = arrange(xyz, model.layout)
     point_logits, type_logits = run(model, [arranged])
-    barred = barred_types(model, settings.fit.types)
+    classes = {find_nearest_type(name, model.types) for name in settings.fit.types}
+    if settings.fit.types and not classes & set(model.types):
+        raise SettingsError(
+            f"expected fit.types to name types the network knows ({', '.join(model.types)}), got "
+            f"{', '.join(settings.fit.types)}"
+        )
+    barred = np.array(
+        [0.0 if not settings.fit.types or name in classes else -np.inf for name in model.types]
+    )
     type_probability = softmax(type_logits[0] + barred)
     types = dict(zip(model.types, map(float, type_probability), strict=True))
     logits = point_logits[: arranged.sampled] + np.append(barred, 0.0)
     return Segmentation(types, logits, xyz[arranged.select[: arranged.sampled]], xyz)
-
-
-def barred_types(model: LoadedNetwork, allowed: tuple[str, ...]) -> np.ndarray:
-    """Return the log prior (types,) of a choice among `allowed` types.
-
-    Types nearest to them count as well. It is 0 or minus infinity; empty allows all.
-    """
-    classes = {find_nearest_type(name, model.types) for name in allowed}
-    if allowed and not classes & set(model.types):
-        raise SettingsError(
-            f"expected fit.types to name types the network knows ({', '.join(model.types)}), got "
-            f"{', '.join(allowed)}"
-        )
-    return np.array([0.0 if not allowed or name in classes else -np.inf for name in model.types])
 
 
 def run(model: LoadedNetwork, arrangements: list[Arrangement]) -> tuple[np.ndarray, np.ndarray]:
@@ -266,7 +260,7 @@ def load(weights: str, device: str = "cpu") -> LoadedNetwork:
     except Exception as error:
         raise InputError(
             f"expected an ONNX network in {weights}, got a file ONNX Runtime cannot read "
-            f"({first_line(error)}); "
+            f"({str(error).splitlines()[0][:120] if str(error) else type(error).__name__}); "
             "install hiproof again or export the network anew with `hiproof train`"
         ) from error
     if metadata.get("format") != FORMAT:
@@ -287,10 +281,6 @@ def import_onnxruntime(alternative: str = "") -> Any:
     Raises InputError where it is missing, with how to do without it, if that can be.
     """
     return import_extra("onnxruntime", "network", "recognising roofs", alternative)
-
-
-def first_line(error: Exception) -> str:
-    return str(error).splitlines()[0][:120] if str(error) else type(error).__name__
 
 
 def softmax(logits: np.ndarray) -> np.ndarray:

@@ -143,7 +143,14 @@ class Stock:
 
     def __init__(self, city: City):
         self.city, self.terrain = city, city.terrain
-        self.blocks, self.first = self.count_blocks()
+        blocks, first, total, k = [], [], 0, 0
+        while total < self.city.buildings:
+            j, i = divmod(k, self.city.blocks_a_row)
+            blocks.append((i, j))
+            first.append(total)
+            total += len(block_buildings(self.city.seed, i, j, self.terrain))
+            k += 1
+        self.blocks, self.first = blocks, first
         corners = np.array([(0, 0), (1, 0), (1, 1), (0, 1)]) * CITY_BLOCK_M
         lower = np.array(self.blocks) * CITY_BLOCK_M
         plan = (
@@ -152,20 +159,6 @@ class Stock:
         )
         self.low, self.high = plan.min(axis=1), plan.max(axis=1)
         self.lots = lru_cache(maxsize=CACHED_BLOCKS)(self.draw_lots)
-
-    def count_blocks(self) -> tuple[list[tuple[int, int]], list[int]]:
-        """Return blocks, and the number of buildings before each.
-
-        The last block may be cut short.
-        """
-        blocks, first, total, k = [], [], 0, 0
-        while total < self.city.buildings:
-            j, i = divmod(k, self.city.blocks_a_row)
-            blocks.append((i, j))
-            first.append(total)
-            total += len(block_buildings(self.city.seed, i, j, self.terrain))
-            k += 1
-        return blocks, first
 
     def draw_lots(self, block: int) -> tuple[Lot, ...]:
         """Draw the lots of a block by its number alone.

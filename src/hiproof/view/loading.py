@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 from ..parametric.finished import open_run
 from ..read.models.damage import Damaged, refuse
@@ -31,15 +30,7 @@ def load_postgis(
     that cannot be written or holds another run.
     """
     run, place = open_run(folder), Path(folder).resolve()
-    srid = find_srid(run.head.crs_of_files)
+    code = (reference_system(run.head.crs_of_files) or "").rpartition("/")[2]
+    srid = int(code) if code.isdigit() and int(code) <= MOST_SRID else 0
     loaded = Load(name or place.name, str(place), prefix, srid, **how)
     return load_tables(dsn, run.describe(damaged), run.head.units, loaded, damaged)
-
-
-def find_srid(crs: Any) -> int:
-    """Return the EPSG code of the metadata's reference system.
-
-    It is 0 (unknown to PostGIS) without one.
-    """
-    code = (reference_system(crs) or "").rpartition("/")[2]
-    return int(code) if code.isdigit() and int(code) <= MOST_SRID else 0

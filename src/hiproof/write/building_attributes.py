@@ -70,10 +70,13 @@ def osm_tags(building: Building, figures: RoofFigures | None) -> dict[str, Any]:
         for ring in building.solid.faces[i].rings
     )
     ground = min(find_ground_height(building, figures), figures.h_base)
+    part = building.parts[main]
     values = (
-        osm_shape(building.parts[main].type),
+        osm_shape(part.type),
         figures.h_max - lowest,
-        find_direction(building, main, figures.face_azimuth_deg[largest]),
+        math.degrees(0.5 * math.pi - part.kappa) % 360.0
+        if part.type in ONE_ENDED
+        else figures.face_azimuth_deg[largest],
         figures.face_slope_deg[largest],
         figures.h_max - ground,
     )
@@ -83,17 +86,6 @@ def osm_tags(building: Building, figures: RoofFigures | None) -> dict[str, Any]:
 def osm_shape(name: str) -> str | None:
     """Return the value of roof:shape of a roof type, None if it has none."""
     return CATALOGUE[name].osm_shape if name in CATALOGUE else None
-
-
-def find_direction(building: Building, main: int, azimuth_deg: float) -> float:
-    """Return the direction of part `main`.
-
-    It is that of its hipped end, else that of its largest face.
-    """
-    part = building.parts[main]
-    return (
-        math.degrees(0.5 * math.pi - part.kappa) % 360.0 if part.type in ONE_ENDED else azimuth_deg
-    )
 
 
 def format_number(value: Any) -> Any:
@@ -206,6 +198,8 @@ def hiproof_attributes(
     quality, kind = building.quality, building.type
     probability = building.types.get(kind) if kind else None
     recognised = max(building.recognised, key=building.recognised.__getitem__, default=None)
+    heights = measure_terrain(building.terrain_intersection)
+    names = ("ground_low", "ground_high", "ground_mean")
     return {
         "status": building.status.code,
         "quality": None if building.grade is None else building.grade.code,
@@ -221,22 +215,13 @@ def hiproof_attributes(
         "points": int(quality.points),
         **{name: round_value(getattr(quality, name)) for name in QUALITY_FIGURES},
         "ground_source": building.ground_source or None,
-        **ground_attributes(building),
+        **dict(zip(names, [None] * 3 if heights is None else map(metres, heights), strict=True)),
         "shift_x": round_value(building.shift[0]),
         "shift_y": round_value(building.shift[1]),
         "iso19107_lod22": None
         if building.built is None
         else check_as_written(building.solid, units),
     }
-
-
-def ground_attributes(building: Building) -> dict[str, Any]:
-    """Return the heights of the terrain along the outline, without prefix."""
-    heights = measure_terrain(building.terrain_intersection)
-    names = ("ground_low", "ground_high", "ground_mean")
-    return dict.fromkeys(names) | (
-        {} if heights is None else dict(zip(names, map(metres, heights), strict=True))
-    )
 
 
 def change_attributes(change: Mapping[str, Any]) -> dict[str, Any]:

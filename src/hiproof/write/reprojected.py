@@ -53,9 +53,14 @@ class Reprojected(Units):
             self.plan_way.transform(coordinates[..., 0], coordinates[..., 1]), axis=-1
         )
         if world.shape[-1] == 3:
-            result = np.concatenate(
-                [result, self.convert_heights(coordinates, world[..., 2])[..., None]], axis=-1
-            )
+            z = world[..., 2]
+            if self.height_way is not None:
+                z = self.height_m * np.asarray(
+                    self.height_way.transform(
+                        coordinates[..., 0], coordinates[..., 1], coordinates[..., 2]
+                    )[2]
+                )
+            result = np.concatenate([result, (z / self.height)[..., None]], axis=-1)
         if not np.isfinite(result).all() and np.isfinite(world).all():
             raise InputError(
                 "expected buildings inside the area of --out-crs, got some that have no place in "
@@ -79,19 +84,6 @@ class Reprojected(Units):
                 * self.own.height
             )
         return np.concatenate([result, z[..., None]], axis=-1)
-
-    def convert_heights(self, coordinates: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Convert heights `z` (...) in metres to the file's unit and level.
-
-        They are at `coordinates` (..., 3) of the first CRS.
-        """
-        if self.height_way is not None:
-            z = self.height_m * np.asarray(
-                self.height_way.transform(
-                    coordinates[..., 0], coordinates[..., 1], coordinates[..., 2]
-                )[2]
-            )
-        return z / self.height
 
 
 def choose_file_crs(crs: Any, requested: str) -> Any:

@@ -167,25 +167,22 @@ def part_shape(
     lod13 = (
         block(part.outline, figures.h_base, metres(figures.h_70p)) if "1.3" in requested else None
     )
-    return PartShape(
-        part.solid, figures, lod13, types, part_attributes(primitives, figures, prefix)
-    )
-
-
-def part_attributes(
-    primitives: list[dict[str, Any]], figures: RoofFigures, prefix: str
-) -> dict[str, Any]:
-    """Return the attributes of a building part by name."""
     result = {
         **shape_attributes(figures),
         "roof_type": figures.roofer_type,
         "roof_n_surfaces": figures.roof_faces,
     }
-    return {
-        **{prefix + name: plain(result[name]) for name in OF_PARTS},
-        f"{OWN}h_eave": plain(metres(figures.h_eave)),
-        f"{OWN}roof_type": primitives[0]["type"] if primitives else None,
-        f"{OWN}primitives": [
-            {name: plain(value) for name, value in values.items()} for values in primitives
-        ],
-    }
+    return PartShape(
+        part.solid,
+        figures,
+        lod13,
+        types,
+        {
+            **{prefix + name: plain(result[name]) for name in OF_PARTS},
+            f"{OWN}h_eave": plain(metres(figures.h_eave)),
+            f"{OWN}roof_type": primitives[0]["type"] if primitives else None,
+            f"{OWN}primitives": [
+                {name: plain(value) for name, value in values.items()} for values in primitives
+            ],
+        },
+    )

@@ -70,9 +70,10 @@ def features(
         first_name, seen_head = first_name if seen_head else name, True
         try:
             transform = read_transform(document) or transform
-            yield Feature(
-                read_objects(document), world_vertices(document, transform, units), place, units
-            )
+            objects = document.get("CityObjects")
+            if not isinstance(objects, dict):
+                raise ValueError(f"{excerpt(objects)} as its CityObjects")
+            yield Feature(objects, world_vertices(document, transform, units), place, units)
         except UNUSABLE as error:
             damage = InputError(
                 f"expected CityJSON that can be read in {place}, got {explain_error(error)}; mend "
@@ -93,13 +94,6 @@ def read_transform(document: dict[str, Any]) -> tuple[np.ndarray, np.ndarray] | 
     if not (np.isfinite(scale).all() and is_plausible(translate[None]).all()):
         raise ValueError(f"a transform to no place on Earth ({excerpt(transform)})")
     return scale, translate
-
-
-def read_objects(document: dict[str, Any]) -> dict[str, Any]:
-    objects = document.get("CityObjects")
-    if not isinstance(objects, dict):
-        raise ValueError(f"{excerpt(objects)} as its CityObjects")
-    return objects
 
 
 def world_vertices(
@@ -162,7 +156,11 @@ def documents(path: Path, damaged: Damaged = refuse) -> Iterator[tuple[dict[str,
                     (damaged if seen_header else refuse)(error)
                     document = {}
                 seen_header = True
-                yield document, name_place(document, place)
+                id = document.get("id")
+                yield (
+                    document,
+                    f"building {id:.80} in {place}" if isinstance(id, str) and id else place,
+                )
     except (OSError, UnicodeDecodeError) as error:
         raise unreadable(path, error) from error
     if not seen_header:
@@ -184,12 +182,6 @@ def parsed_line(line: str, place: str, seen_header: bool) -> dict[str, Any]:
             f"{excerpt(kind)} in {place}; is this another kind of JSON?"
         )
     return document
-
-
-def name_place(document: dict[str, Any], place: str) -> str:
-    """Name the building of a feature beside its place in the file."""
-    id = document.get("id")
-    return f"building {id:.80} in {place}" if isinstance(id, str) and id else place
 
 
 def parse_object(text: str, place: str) -> dict[str, Any]:

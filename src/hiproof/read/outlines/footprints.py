@@ -162,7 +162,12 @@ def read_features(
     )
     meta, _, geometries, _ = features
     refuse_nothing(path, len(geometries), meta["total_bounds"], where, bbox)
-    refuse_lines(geometries, path)
+    kinds = {g.geom_type for g in geometries if g is not None}
+    if kinds and not any("Polygon" in kind or kind == "GeometryCollection" for kind in kinds):
+        raise InputError(
+            f"expected polygons in {path}, got {', '.join(sorted(kinds))}; name another layer, or "
+            "close the lines first"
+        )
     return features
 
 
@@ -209,16 +214,6 @@ def refuse_nothing(
     raise InputError(
         f"expected footprints in {path}, got a layer without features; name another file or layer"
     )
-
-
-def refuse_lines(geometries: np.ndarray, path: str | Path) -> None:
-    """Raise InputError where none of the geometries can be an outline."""
-    kinds = {g.geom_type for g in geometries if g is not None}
-    if kinds and not any("Polygon" in kind or kind == "GeometryCollection" for kind in kinds):
-        raise InputError(
-            f"expected polygons in {path}, got {', '.join(sorted(kinds))}; name another layer, or "
-            "close the lines first"
-        )
 
 
 def refuse_missing(path: str | Path) -> None:

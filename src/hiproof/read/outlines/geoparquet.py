@@ -54,11 +54,17 @@ def read_parquet(
     `box_in` gives the box that rows have to meet, in the file's CRS, None for all rows. `where` is
     a condition in SQL. Raises InputError where the file or the condition cannot be read.
     """
-    refuse_layer(path, layer)
+    stem = Path(str(path).partition("?")[0]).stem
+    if layer not in (None, 0, stem):
+        raise InputError(
+            f"expected no --layer for {path}, which holds one table, got {layer!r}; leave it out"
+        )
     with open_parquet(path) as file:
         column = geometry_column(file, path)
         box = box_in(column.crs)
-        names = attribute_names(file, column)
+        boxes = {way[0] for way in column.sides or ()}
+        without = {column.name, *column.others, *boxes}
+        names = [name for name in file.schema_arrow.names if name not in without]
         extent = None if box is None else shapely.box(*box)
         table, numbers = read_rows(file, column, names, extent)
     if where and len(table):
@@ -67,15 +73,6 @@ def read_parquet(
     meta = {"fields": names, "crs": column.crs, "total_bounds": column.bounds}
     columns = [convert_values(table.column(name)) for name in names]
     return meta, numbers, geometries_in(table, column), columns
-
-
-def refuse_layer(path: str | Path, layer: str | int | None) -> None:
-    """Raise InputError for another layer than the one that GDAL names after the file."""
-    stem = Path(str(path).partition("?")[0]).stem
-    if layer not in (None, 0, stem):
-        raise InputError(
-            f"expected no --layer for {path}, which holds one table, got {layer!r}; leave it out"
-        )
 
 
 def convert_values(column: Any) -> np.ndarray:
@@ -275,13 +272,6 @@ def sides_of_rows(told: dict[str, Any], schema: Any) -> tuple[tuple[str, ...], .
         return None
     names = {field.name for field in kind.fields}
     return tuple(("bbox", side) for side in BOX_COLUMNS) if names.issuperset(BOX_COLUMNS) else None
-
-
-def attribute_names(file: Any, column: GeometryColumn) -> list[str]:
-    """Return the columns of an open file other than geometries and their boxes."""
-    boxes = {way[0] for way in column.sides or ()}
-    without = {column.name, *column.others, *boxes}
-    return [name for name in file.schema_arrow.names if name not in without]
 
 
 def read_rows(

@@ -90,7 +90,19 @@ def read_facts(file: BinaryIO) -> LasFacts:
     size = file.seek(0, 2)
     file.seek(0)
     facts = parse_header(file.read(max(HEADER_BYTES.values())), size)
-    check_layout(facts)
+    if not HEADER_BYTES[facts.minor] <= facts.header_bytes <= facts.data_start <= facts.points_end:
+        raise Implausible(
+            f"its header of {facts.header_bytes} bytes tells of points from byte "
+            f"{facts.data_start} to {facts.points_end}; it is truncated or damaged"
+        )
+    if (
+        facts.point_format >= len(RECORD_BYTES)
+        or facts.point_bytes < RECORD_BYTES[facts.point_format]
+    ):
+        raise Implausible(
+            f"its header tells of points of format {facts.point_format} in {facts.point_bytes} "
+            "bytes each"
+        )
     records = dict(iterate_records(file, facts))
     projection = {
         number: content for (user, number), content in records.items() if user == "LASF_Projection"
@@ -159,23 +171,6 @@ def parse_header(head: bytes, size: int) -> LasFacts:
         mins=numbers[7::2],
         far_records=(far_start, far_count),
     )
-
-
-def check_layout(facts: LasFacts) -> None:
-    """Check that header, records and points follow one another in the file."""
-    if not HEADER_BYTES[facts.minor] <= facts.header_bytes <= facts.data_start <= facts.points_end:
-        raise Implausible(
-            f"its header of {facts.header_bytes} bytes tells of points from byte "
-            f"{facts.data_start} to {facts.points_end}; it is truncated or damaged"
-        )
-    if (
-        facts.point_format >= len(RECORD_BYTES)
-        or facts.point_bytes < RECORD_BYTES[facts.point_format]
-    ):
-        raise Implausible(
-            f"its header tells of points of format {facts.point_format} in {facts.point_bytes} "
-            "bytes each"
-        )
 
 
 def iterate_records(file: BinaryIO, facts: LasFacts) -> Iterator[tuple[tuple[str, int], bytes]]:

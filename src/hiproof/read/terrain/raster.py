@@ -10,6 +10,7 @@ import functools
 import warnings
 from collections.abc import Callable
 from functools import cached_property
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -306,25 +307,16 @@ class RasterTerrain:
 
         Pixels hold them that lie far from all others of some tiles.
         """
-        pairs = [
-            self.stored_and_heights(*tile)
-            for tile in sampled_tiles(self.dataset.height, self.dataset.width)
+        along = [
+            np.unique(
+                np.linspace(0, (size - 1) // TILE_PX, SAMPLED_TILES).round().astype(int)
+            ).tolist()
+            for size in (self.dataset.height, self.dataset.width)
         ]
+        pairs = [self.stored_and_heights(*tile) for tile in product(*along)]
         stored = np.concatenate([stored[np.isfinite(heights)] for stored, heights in pairs])
         heights = np.concatenate([heights[np.isfinite(heights)] for _, heights in pairs])
         return tuple(code for code in NODATA_CODES if is_isolated(heights, stored == code))
-
-
-def sampled_tiles(height: int, width: int) -> list[tuple[int, int]]:
-    """Return a sample of the tiles of a raster, evenly spread.
-
-    There are SAMPLED_TILES by SAMPLED_TILES, or all where it has fewer.
-    """
-    along = [
-        np.unique(np.linspace(0, (size - 1) // TILE_PX, SAMPLED_TILES).round().astype(int)).tolist()
-        for size in (height, width)
-    ]
-    return [(row, column) for row in along[0] for column in along[1]]
 
 
 def is_isolated(heights: np.ndarray, is_coded: np.ndarray) -> bool:

@@ -173,8 +173,15 @@ def building_element(sheet: Sheet) -> str:
     """
     building, figures, name, write = sheet.building, sheet.figures, sheet.gml_name, sheet.head.write
     text = [f'<bldg:Building gml:id="bldg-{name}"><gml:name>{xml_text(building.id)}</gml:name>']
+    change, created = sheet.building.change or {}, sheet.head.creation_date
+    begins = change.get("valid_from") if created is None else created.isoformat()
     text += [
-        f"<core:{date}>{value}</core:{date}>" for date, value in find_dates(sheet).items() if value
+        f"<core:{date}>{value}</core:{date}>"
+        for date, value in {
+            "creationDate": begins,
+            "terminationDate": change.get("valid_to"),
+        }.items()
+        if value
     ]
     text += [generic_attribute(key, value) for key, value in sheet.attributes.items()]
     if figures is not None:
@@ -202,16 +209,6 @@ def building_element(sheet: Sheet) -> str:
             text += boundary_surfaces(solid, building.parts, sheet.finest[1], ids, rings)
     text += [part_element(sheet, number, part) for number, part in enumerate(sheet.shapes.parts, 1)]
     return "".join([*text, sheet.extension, "</bldg:Building>"])
-
-
-def find_dates(sheet: Sheet) -> dict[str, str | None]:
-    """Return the dates of a building's life by their name in CityGML.
-
-    They are those of the surveys that show its beginning and its end.
-    """
-    change, created = sheet.building.change or {}, sheet.head.creation_date
-    begins = change.get("valid_from") if created is None else created.isoformat()
-    return {"creationDate": begins, "terminationDate": change.get("valid_to")}
 
 
 def installation_elements(sheet: Sheet) -> list[str]:

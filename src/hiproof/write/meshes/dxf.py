@@ -18,7 +18,7 @@ import numpy as np
 import shapely
 
 from ...extras import import_extra
-from ...model import CEILING, GROUND, ROOF, WALL, Face
+from ...model import CEILING, GROUND, ROOF, WALL
 from ..colours import GROUND_COLOUR, ROOF_COLOURS, WALL_COLOUR
 from .triangles import faces_triangles
 from .viewed import ViewedModel
@@ -84,7 +84,10 @@ def draw_building(space: Any, model: ViewedModel, unit_m: float) -> None:
     for face, triangles in zip(
         solid.faces, faces_triangles(solid.vertices, solid.faces), strict=True
     ):
-        edges = face_edges(face)
+        pairs = {
+            pair for ring in face.rings for pair in zip(ring, (*ring[1:], ring[0]), strict=True)
+        }
+        edges = pairs | {(b, a) for a, b in pairs}
         for a, b, c in triangles.tolist():
             sides = zip(INVISIBLE_EDGES, ((a, b), (b, c), (c, a)), strict=True)
             hidden = sum(bit for bit, side in sides if side not in edges)
@@ -105,9 +108,3 @@ def draw_building(space: Any, model: ViewedModel, unit_m: float) -> None:
     space.add_text(" ".join(model.id.split()), dxfattribs=attributes).set_placement(
         (*middle[:2], places[:, 2].max())
     )
-
-
-def face_edges(face: Face) -> set[tuple[int, int]]:
-    """Return the edges of a face's rings as pairs of vertices, in both directions."""
-    pairs = {pair for ring in face.rings for pair in zip(ring, (*ring[1:], ring[0]), strict=True)}
-    return pairs | {(b, a) for a, b in pairs}

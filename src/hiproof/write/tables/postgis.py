@@ -128,7 +128,10 @@ def load_tables(
                 psycopg.connect(refuse_half_a_password(dsn), connect_timeout=TIMEOUT_S)
             )
             cursor = stack.enter_context(connection.cursor())
-            add_extension(connection, cursor)
+            # One load adds PostGIS at a time: PostgreSQL does not wait by itself.
+            cursor.execute("select pg_advisory_xact_lock(%s, 0)", (LOCKS,))
+            cursor.execute("create extension if not exists postgis")
+            connection.commit()
             return Loading(cursor, run).load(stack, buildings, units, damaged)
         except (psycopg.Error, UnicodeError) as error:
             raise explain_not_written(error) from error
@@ -140,16 +143,6 @@ def explain_not_written(error: Exception) -> OutputError:
     is_reached = isinstance(error, UnicodeError) or getattr(error, "sqlstate", None)
     advice = "" if is_reached else "; check the address"
     return OutputError(f"expected a PostGIS database that can be written, got: {reason}{advice}")
-
-
-def add_extension(connection: Any, cursor: Any) -> None:
-    """Add PostGIS to the database where it is missing.
-
-    One load does so at a time: PostgreSQL does not wait by itself.
-    """
-    cursor.execute("select pg_advisory_xact_lock(%s, 0)", (LOCKS,))
-    cursor.execute("create extension if not exists postgis")
-    connection.commit()
 
 
 class Loading:
@@ -178,7 +171,8 @@ class Loading:
         ]
         count = collect_rows(waiting, buildings, units, damaged)
         if self.run.replace:
-            self.drop_tables()
+            names = ", ".join(self.name(t.ending) for t in reversed(POSTGIS_TABLES))
+            self.cursor.execute(f"drop table if exists {names}, {self.name('runs')}")
         for table, rows in zip(POSTGIS_TABLES, waiting, strict=True):
             if rows.is_needed or self.table_exists(table.ending):
                 self.fill_table(table, rows)
@@ -222,14 +216,12 @@ class Loading:
         self.cursor.execute("select to_regclass(%s) is not null", (self.name(ending),))
         return bool(self.cursor.fetchone()[0])
 
-    def drop_tables(self) -> None:
-        names = ", ".join(self.name(t.ending) for t in reversed(POSTGIS_TABLES))
-        self.cursor.execute(f"drop table if exists {names}, {self.name('runs')}")
-
     def fill_table(self, table: PostgisTable, rows: WaitingRows) -> None:
         """Make the table or the columns that it lacks, and replace this run's rows in it."""
         kinds = rows.kinds(PREFIX)
-        names = column_names([cut_name(name) for name in kinds], OWN_COLUMNS)
+        # room for a number within PostgreSQL's limit
+        cut = (name.encode()[: MOST_NAME_BYTES - 4].decode(errors="ignore") for name in kinds)
+        names = column_names([name or "column" for name in cut], OWN_COLUMNS)
         columns = dict(zip(names, kinds.values(), strict=True))
         if self.table_exists(table.ending):
             columns = self.widen_table(table, columns)
@@ -257,9 +249,15 @@ class Loading:
         name = self.name(table.ending)
         self.cursor.execute(f"delete from {name} where run = %s", (self.run.name,))
         self.settle_srid(table, name)
-        present, used = self.read_columns(name)
+        self.cursor.execute(
+            "select attname, format_type(atttypid, null), attisdropped from pg_attribute "
+            "where attrelid = %s::regclass and attnum > 0",
+            (name,),
+        )
+        rows = self.cursor.fetchall()
+        present = {c: KIND_OF_TYPE.get(t, str) for c, t, dropped in rows if not dropped}
         additions = {c: kind for c, kind in columns.items() if c not in present}
-        self.refuse_too_many(table, used + len(additions))
+        self.refuse_too_many(table, len(rows) + len(additions))
         changes = [f"add column {quote(c)} {POSTGRES_TYPES[kind]}" for c, kind in additions.items()]
         for c, kind in columns.items():
             common = column_kind({kind, present.get(c, kind)}, "text")
@@ -272,16 +270,6 @@ class Loading:
         if changes:
             self.cursor.execute(f"alter table {name} {', '.join(changes)}")
         return columns
-
-    def read_columns(self, name: str) -> tuple[dict[str, type], int]:
-        """Return a table's columns with types, and how many it has ever had."""
-        self.cursor.execute(
-            "select attname, format_type(atttypid, null), attisdropped from pg_attribute "
-            "where attrelid = %s::regclass and attnum > 0",
-            (name,),
-        )
-        rows = self.cursor.fetchall()
-        return {c: KIND_OF_TYPE.get(t, str) for c, t, dropped in rows if not dropped}, len(rows)
 
     def settle_srid(self, table: PostgisTable, name: str) -> None:
         """Give the run's reference system to an empty table.
@@ -405,12 +393,3 @@ def encode_place(wkb: bytes, srid: int) -> str:
     if kind == WKB_POLYGON:
         kind, wkb = WKB_MULTIPOLYGON, struct.pack("<BII", 1, WKB_MULTIPOLYGON, 1) + wkb
     return (struct.pack("<BII", order, kind | WKB_HAS_SRID, srid) + wkb[5:]).hex()
-
-
-def cut_name(name: str) -> str:
-    """Cut a column's name to PostgreSQL's limit, with room for a number.
-
-    >>> len(cut_name("é" * 60).encode())
-    58
-    """
-    return name.encode()[: MOST_NAME_BYTES - 4].decode(errors="ignore") or "column"

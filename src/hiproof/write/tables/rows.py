@@ -15,7 +15,7 @@ import shapely
 
 from ...errors import OutputError
 from ...frames import METRES, Units
-from ...model import ROOF, Building, Face, Part
+from ...model import ROOF, Building, Face
 from ...model.roof_figures import RoofFigures
 from ...primitives.cants import CANTED, MEASURES, list_cants
 from ..attribute_list import SHAPE, TABLES
@@ -73,11 +73,17 @@ def table_rows(
     its roof faces, by face.
     """
     parts = part_rows(building, units)
+    rows = []
+    for model in (building.change or {}).get("history", ()):
+        shell, *holes = model["outline"]
+        values = {name: model.get(name) for name in TABLES["history"].names}
+        values |= {"successor": plain_text(building.id), "parts": len(model["parts"])}
+        rows.append((encode_geometry(shapely.Polygon(shell, holes), units), values))
     return Rows(
         (building_row(building, attributes, units),),
         parts,
         surface_rows(building, figures, units, surfaces),
-        history_rows(building, units),
+        tuple(rows),
     )
 
 
@@ -99,17 +105,6 @@ def find_outline(building: Building) -> shapely.Geometry | None:
     It is the modelled one, else the one requested, else None.
     """
     return building.footprint if building.built is None else building.roof.world_outline
-
-
-def history_rows(building: Building, units: Units = METRES) -> tuple[Row, ...]:
-    """Return a row a model that ended, with its outline."""
-    rows = []
-    for model in (building.change or {}).get("history", ()):
-        shell, *holes = model["outline"]
-        values = {name: model.get(name) for name in TABLES["history"].names}
-        values |= {"successor": plain_text(building.id), "parts": len(model["parts"])}
-        rows.append((encode_geometry(shapely.Polygon(shell, holes), units), values))
-    return tuple(rows)
 
 
 def part_rows(building: Building, units: Units = METRES) -> tuple[Row, ...]:
@@ -136,6 +131,15 @@ def part_values(building: Building, number: int, visible: shapely.Geometry) -> d
         building.parts[number],
         building.roof.frame.to_world(building.parts[number].translation),
     )
+    # Cants share a column: thirty columns that hardly a part fills would hide the others.
+    cants = list_cants(part.parameters)
+    rows = [
+        [round_value(part.parameters[f"{measure}_{cant}"]) for measure in MEASURES]
+        for cant in cants
+    ]
+    columns = {"t_z": "z_eave_sigma", "kappa": "rotation_sigma"} | {
+        name: f"{name}_sigma" for name in SHAPE
+    }
     return {
         "part": number,
         "type": part.type,
@@ -149,33 +153,12 @@ def part_values(building: Building, number: int, visible: shapely.Geometry) -> d
             for name, value in part.parameters.items()
             if name not in CANTED
         },
-        **join_cants(part),
-        **list_sigmas(part),
-    }
-
-
-def join_cants(part: Part) -> dict[str, str]:
-    """Return the column of a part's cants, where it has any.
-
-    Thirty columns that hardly a part fills would hide the others.
-    """
-    cants = list_cants(part.parameters)
-    rows = [
-        [round_value(part.parameters[f"{measure}_{cant}"]) for measure in MEASURES]
-        for cant in cants
-    ]
-    return {"cants": ENCODER.encode(rows)} if cants else {}
-
-
-def list_sigmas(part: Part) -> dict[str, float]:
-    """Return standard deviations by column, those of angles in degrees."""
-    columns = {"t_z": "z_eave_sigma", "kappa": "rotation_sigma"} | {
-        name: f"{name}_sigma" for name in SHAPE
-    }
-    return {
-        columns[name]: round_value(math.degrees(value) if name == "kappa" else value)
-        for name, value in part.sigma.items()
-        if name in columns
+        **({"cants": ENCODER.encode(rows)} if cants else {}),
+        **{
+            columns[name]: round_value(math.degrees(value) if name == "kappa" else value)
+            for name, value in part.sigma.items()
+            if name in columns
+        },
     }
 
 
