@@ -146,10 +146,7 @@ def roof_points(xyz: np.ndarray, more_odds: float = 0.0) -> np.ndarray:
 
 
 def log_odds(surfaces: Surfaces) -> np.ndarray:
-    """Return each voxel's log odds (v,) of belonging to a roof or wall.
-
-    They follow from its surface alone.
-    """
+    """Return each voxel's log odds (v,) of belonging to a roof or wall, by its surface alone."""
     extent = np.log(surfaces.extent_m2)
     return (
         LOG_ROUGHNESS * np.log(surfaces.roughness_m + 0.02)
@@ -168,10 +165,7 @@ def smooth_odds(surfaces: Surfaces, odds: np.ndarray) -> np.ndarray:
 
 
 def building_points(xyz: np.ndarray, height: np.ndarray, cell_m: float) -> np.ndarray:
-    """Return which (n,) of the points (n, 3) are a building's.
-
-    `height` (n,) is above ground.
-    """
+    """Return which (n,) of the points (n, 3) are a building's; `height` (n,) is above ground."""
     cells, mask = SquareCells(xyz, cell_m), height > HIGH_OBJECT_M
     odds, is_large = np.zeros(len(xyz)), np.zeros(len(xyz), bool)
     if mask.sum() < 4:
@@ -232,10 +226,7 @@ NO_ROOFS = {3: "low vegetation", 7: "noise", 9: "water", 17: "bridges", 18: "noi
 
 
 class RoofSearch:
-    """The search for the roofs of a cloud, square by square (`SquareSearch`).
-
-    `on_error` is called with the indices of the points of a square in which the search fails.
-    """
+    """The search for roofs by squares; `on_error` gets the points of a square that fails."""
 
     def __init__(
         self,
@@ -257,10 +248,7 @@ class RoofSearch:
         squares: set[Square] | None = None,
         progress: Callable[[int, int], None] = lambda *_: None,
     ) -> np.ndarray:
-        """Return ascending indices of the points of roofs in `squares`, or in all.
-
-        Raises InputError where there are none in the whole cloud.
-        """
+        """Return ascending indices of points of roofs in `squares`, or in all: else InputError."""
         self.search.classify(self.search.squares if squares is None else squares, progress)
         roofs = self.indices[(self.search.classes == BUILDING) & self.may_be_roof]
         if self.n_failed or squares is not None:
@@ -271,10 +259,7 @@ class RoofSearch:
 
 
 def select_roof_candidates(cloud: PointCloud, ground_classes: tuple[int, ...]) -> np.ndarray:
-    """Return ascending indices of all points whose class may hold roofs.
-
-    Raises InputError where there are none.
-    """
+    """Return ascending indices of all points whose class may hold roofs; none is an InputError."""
     indices = np.flatnonzero(~np.isin(cloud.classes, (*NO_ROOFS, *ground_classes)))
     return require_roofs(
         indices, cloud, "all of them ground, water, noise, low vegetation or bridges"

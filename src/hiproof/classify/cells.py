@@ -9,10 +9,7 @@ from ..geometry.grid import cell_range
 
 
 class SquareCells:
-    """The cells of side `cell_m` (m) that points (n, 3) lie in.
-
-    Tables are (columns, rows), `index` (n,) is flat.
-    """
+    """The cells of side `cell_m` of points (n, 3): tables (columns, rows), flat `index` (n,)."""
 
     def __init__(self, xyz: np.ndarray, cell_m: float):
         self.cell_m = cell_m
@@ -20,10 +17,7 @@ class SquareCells:
         self.index = self.of(xyz)
 
     def of(self, xyz: np.ndarray) -> np.ndarray:
-        """Return the flat index (k,) of the cells that hold the points `xyz` (k, 3).
-
-        The points have to lie among those given before.
-        """
+        """Return the flat index (k,) of the cells of `xyz` (k, 3), which are among the points."""
         column, row = (np.floor(xyz[:, :2] / self.cell_m).astype(np.int64) - self.first).T
         return column * self.shape[1] + row
 
@@ -34,10 +28,7 @@ class SquareCells:
         )
 
     def top(self, values: np.ndarray) -> np.ndarray:
-        """Return a table of the largest of the `values` (n,) in each cell.
-
-        It is minus infinity where the cell has no point.
-        """
+        """Return a table of the largest of the `values` (n,) in each cell, minus infinity else."""
         table = np.full(self.shape[0] * self.shape[1], -np.inf)
         np.maximum.at(table, self.index, values)
         return table.reshape(self.shape)
@@ -63,10 +54,7 @@ class SquareCells:
 
 
 def plan_density(xy: np.ndarray) -> float:
-    """Return the points a square metre where there are points.
-
-    It is the median over occupied cells that are large enough for four points.
-    """
+    """Return the points a square metre, the median over occupied cells large enough for four."""
     xy = np.asarray(xy, float)[:, :2]
     for cell_m in (1.0, 2.0, 4.0, 8.0):
         cells = np.floor(xy / cell_m).astype(np.int64)

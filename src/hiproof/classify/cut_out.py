@@ -54,10 +54,7 @@ def is_cut_out(xyz: np.ndarray) -> bool | None:
 
 
 def find_next_heights(height: np.ndarray, axis: int, way: int) -> np.ndarray:
-    """Return for each cell (c, r) the height of the next cell with points.
-
-    The search goes REACH_CELLS to one side. It is minus infinity where there is none.
-    """
+    """Return the height of the next cell with points up to REACH_CELLS aside, else -infinity."""
     wide = np.pad(height, REACH_CELLS, constant_values=-np.inf)
     result = np.full(wide.shape, -np.inf)
     for step in range(REACH_CELLS, 0, -1):

@@ -86,10 +86,7 @@ def merge_classes(previous: np.ndarray, result: np.ndarray) -> np.ndarray:
 
 
 def read_whole(path: Path) -> laspy.LasData:
-    """Read everything in the file.
-
-    Raises InputError where it cannot be read, is empty, or is no LAS.
-    """
+    """Read everything in the file; raises InputError where it is unreadable, empty or no LAS."""
     if file_kind(path) != "las":
         raise InputError(
             f"expected a LAS, LAZ or COPC file at {path}, got another kind of point cloud; convert "
@@ -104,10 +101,7 @@ def read_whole(path: Path) -> laspy.LasData:
 
 
 def write_whole(las: laspy.LasData, out: Path) -> None:
-    """Write the file under its name, whole or not at all.
-
-    An octree of COPC is left out, as the copy has none.
-    """
+    """Write the file whole or not at all, without an octree of COPC, as the copy has none."""
     header = las.header
     header.vlrs = [record for record in header.vlrs if record.user_id != "copc"]
     header.evlrs = [record for record in header.evlrs or [] if record.user_id != "copc"]

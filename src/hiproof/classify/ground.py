@@ -31,20 +31,14 @@ SMOOTHINGS = 30  # passes of a mean over neighbours that smooth what fills a gap
 
 @dataclass(frozen=True)
 class GroundGrid:
-    """Heights `z` (columns, rows) of the ground at the centres of square cells.
-
-    The first cell's corner is `corner` (2,).
-    """
+    """Heights `z` (columns, rows) of the ground at cells' centres, the first from `corner` (2,)."""
 
     corner: np.ndarray
     z: np.ndarray
     cell_m: float
 
     def height_at(self, xy: np.ndarray) -> np.ndarray:
-        """Return the height (n,) at `xy` (n, 2 or more), bilinear between centres.
-
-        Beyond the border it is that of the border.
-        """
+        """Return the height (n,) at `xy` (n, 2 or more), bilinear, beyond the border its own."""
         place = (np.asarray(xy, float)[:, :2] - self.corner) / self.cell_m - 0.5
         return scipy.ndimage.map_coordinates(self.z, place.T, order=1, mode="nearest")
 
@@ -81,10 +75,7 @@ def bare_points(lowest: np.ndarray) -> np.ndarray:
 
 
 def lowest_in_cells(xyz: np.ndarray, cell_m: float) -> tuple[tuple[int, int], np.ndarray]:
-    """Return the lowest height of points (n, 3) in each cell (c, r).
-
-    It is NaN where there is none. The first cell of the world's grid comes first.
-    """
+    """Return the lowest height of points (n, 3) in each cell (c, r) of the world's grid, or NaN."""
     first, size = cell_range(xyz, cell_m)
     column, row = (np.floor(xyz[:, :2] / cell_m).astype(np.int64) - first).T
     lowest = np.full(size, np.inf)
@@ -93,10 +84,7 @@ def lowest_in_cells(xyz: np.ndarray, cell_m: float) -> tuple[tuple[int, int], np
 
 
 def remove_objects(lowest: np.ndarray, cell_m: float = CELL_M) -> np.ndarray:
-    """Replace heights that are not the ground's by NaN.
-
-    `lowest` are the lowest heights of cells (c, r), NaN where there is no point.
-    """
+    """Replace lowest heights of cells (c, r) that are not the ground's by NaN."""
     lowest = np.where(lowest < np.nanmedian(lowest) - ABYSS_M, np.nan, lowest)
     level = lowest - fit_plane(lowest, cell_m)
     pit = -open_heights(-level, 1) - level > PIT_M
@@ -138,10 +126,7 @@ def open_heights(z: np.ndarray, half: int) -> np.ndarray:
 
 
 def fill_gaps(z: np.ndarray) -> np.ndarray:
-    """Fill unknown cells (NaN) of `z` with the nearest known height, smoothed.
-
-    They are zero where nothing is known.
-    """
+    """Fill unknown cells (NaN) of `z` with the nearest known height, smoothed, else with zero."""
     mask = np.isfinite(z)
     if not mask.any():
         return np.zeros(z.shape)

@@ -168,10 +168,7 @@ def separate_houses(
 
 
 def without_necks(area: shapely.Geometry, gap_m: float, roofs: Roofs) -> list[shapely.Geometry]:
-    """Split `area` where only a gutter or a tree joins its parts.
-
-    Hardly more than a few returns lie in such a neck between two houses.
-    """
+    """Split `area` at necks of hardly any roof, where a gutter or a tree joins its parts."""
     wide = shapely.buffer(
         shapely.buffer(area, 0.5 * gap_m, join_style="mitre"),
         -0.5 * (gap_m + NECK_M),
@@ -205,10 +202,7 @@ def is_roof(surfaces: Surfaces) -> np.ndarray:
 
 
 class Roofs(NamedTuple):
-    """Voxels on smooth surfaces that are no walls.
-
-    They have places (r, 2), `m2` (r,) in plan, and normals (r, 3).
-    """
+    """Voxels on smooth surfaces, no walls: places (r, 2), `m2` (r,) in plan, normals (r, 3)."""
 
     xy: np.ndarray
     m2: np.ndarray
@@ -222,10 +216,7 @@ def roof_m2(area: shapely.Geometry, roofs: Roofs) -> float:
 
 
 def depth_m(side: shapely.Geometry, cut: Cut, roofs: Roofs) -> float:
-    """Return how far (m) a `side` of the cut reaches away from it.
-
-    It is twice what half of its roof does.
-    """
+    """Return twice how far (m) half of the roof on a `side` of the cut lies away from it."""
     inside = shapely.intersects_xy(side, *roofs.xy.T)
     return 2.0 * float(np.median(np.abs(roofs.xy[inside] @ cut.normal - cut.offset)))
 
@@ -265,10 +256,7 @@ def find_bonds(surfaces: Surfaces) -> Bonds:
 
 
 def find_directions(area: shapely.Geometry, roofs: Roofs) -> np.ndarray:
-    """Return the azimuths (d,) in which cuts are looked for.
-
-    They are those of slopes and of the block's border, and across them.
-    """
+    """Return the azimuths (d,) of cuts: along and across slopes and the block's border."""
     shapely.prepare(area)
     normal = roofs.normal[shapely.intersects_xy(area, *roofs.xy.T)]
     rings = [
@@ -303,10 +291,7 @@ def best_cuts(bonds: Bonds, directions: np.ndarray) -> list[Cut]:
 
 
 def refine_cut(cut: Cut, bonds: Bonds) -> Cut | None:
-    """Return the best line near `cut`, turned a little, at a tenth of a metre.
-
-    None where it is none to cut at.
-    """
+    """Return the best line near `cut`, turned a little, at a tenth of a metre, or None."""
     x, y = bonds.middle.T
     away2 = (x - cut.middle[0]) ** 2 + (y - cut.middle[1]) ** 2
     nearby = bonds.among(away2 < (0.5 * cut.length + 2.0) ** 2)
@@ -334,10 +319,7 @@ def refine_cut(cut: Cut, bonds: Bonds) -> Cut | None:
 
 
 def cuts_along(angle: float, bonds: Bonds, lines_m: float, strictness: float = 1.0) -> list[Cut]:
-    """Return cuts along lines whose normal has the azimuth `angle`.
-
-    Lines are `lines_m` apart.
-    """
+    """Return cuts along lines, `lines_m` apart, whose normal has the azimuth `angle`."""
     if not len(bonds.state):
         return []
     normal = np.array([math.cos(angle), math.sin(angle)])
@@ -379,11 +361,7 @@ def crossings(bonds: Bonds, normal: np.ndarray, lines_m: float) -> tuple[np.ndar
 def is_between(
     bonds: Bonds, normal: np.ndarray, lines_m: float, first: int, start: float, shape: Sequence[int]
 ) -> np.ndarray:
-    """Return whether points lie on both sides of each line in each stretch.
-
-    The table (lines, stretches) has a `shape`. Along the border of a block there is nothing to be
-    cut.
-    """
+    """Return whether points lie on both sides of lines at stretches; borders are not cut."""
     x, y = bonds.ends.reshape(-1, 2)[np.unique(bonds.points, return_index=True)[1]].T
     v = x * normal[0] + y * normal[1]
     stretch = ((y * normal[0] - x * normal[1] - start) / STRETCH_M).astype(np.int64)
@@ -417,10 +395,7 @@ def find_runs(
 
 
 def cut_area(area: shapely.Geometry, cut: Cut) -> list[shapely.Geometry]:
-    """Return the parts of `area` after a cut.
-
-    Parts that go on around the ends of the cut, or cross it elsewhere, stay together.
-    """
+    """Return the parts of `area` after a cut, together where they join beyond its ends."""
     distant = 2.0 * math.hypot(*np.ptp(np.array(area.bounds).reshape(2, 2), axis=0)) + 10.0
     lower, upper = cut.middle @ cut.along - distant, cut.middle @ cut.along + distant
     halves = [

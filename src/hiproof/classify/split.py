@@ -66,10 +66,7 @@ class FoundBuilding:
 
 
 class RoofPoints(NamedTuple):
-    """The points of one building (ascending indices), with their area.
-
-    It may also be a place where the search failed.
-    """
+    """The points (ascending indices) and area of one building, or of where the search failed."""
 
     members: np.ndarray
     area: shapely.Geometry
@@ -114,10 +111,7 @@ def divide_roof_points(
     box: Box | None = None,
     progress: Progress = ignore,
 ) -> list[RoofPoints]:
-    """Divide the `roof` points (indices) among buildings.
-
-    With a `box`, only groups that may meet it are divided.
-    """
+    """Divide the `roof` points (indices) among buildings, those that may meet a `box`."""
     if not len(roof):
         return []
     xy = xyz[roof, :2]
@@ -135,10 +129,7 @@ def divide_roof_points(
 
 
 def meets_box(xyz: np.ndarray, box: Box, gap_m: float) -> bool:
-    """Return whether the area of a group of points (n, 3) may meet the box.
-
-    The area consists of cells, which reach half a gap beyond the points at most.
-    """
+    """Return whether cells of points (n, 3), half a gap beyond them, may meet the box."""
     lower, upper = np.array(box[:2]) - gap_m / 2, np.array(box[2:]) + gap_m / 2
     return bool(((xyz[:, :2] >= lower) & (xyz[:, :2] <= upper)).all(axis=1).any())
 
@@ -170,10 +161,7 @@ def find_roofs_around(
 def select_large_groups(
     groups: list[np.ndarray], xyz: np.ndarray, read: ReadSettings
 ) -> list[np.ndarray]:
-    """Select the groups that are large enough for a building.
-
-    An InputWarning counts the others.
-    """
+    """Select the groups large enough for a building; an InputWarning counts the others."""
     large = [
         group
         for group in groups
@@ -243,10 +231,7 @@ def building_points(cloud: PointCloud, classes: tuple[int, ...]) -> np.ndarray |
 
 
 def select_unclassified(cloud: PointCloud) -> np.ndarray | None:
-    """Return ascending indices of all points but noise.
-
-    Returns None where there are none, or any has a class.
-    """
+    """Return ascending indices of all points but noise, None where any has a class."""
     index = np.flatnonzero(~np.isin(cloud.classes, NOISE))
     return index if len(index) and np.isin(cloud.classes, NEVER_CLASSIFIED + NOISE).all() else None
 
@@ -304,19 +289,13 @@ def without_building_class(cloud: PointCloud, targets: tuple[int, ...]) -> str:
 
 
 def adapted_gap(xy: np.ndarray) -> float:
-    """Return the gap (m) that separates buildings at the density of `xy` (n, 2).
-
-    It is 1 m, and more where points are sparse.
-    """
+    """Return the gap (m) between buildings: 1 m, more where `xy` (n, 2) are sparse."""
     required = SPACINGS_PER_GAP / np.sqrt(plan_density(xy))
     return next((gap for gap in GAPS_M if gap >= required), GAPS_M[-1])
 
 
 def group_roughly(xy: np.ndarray) -> list[np.ndarray]:
-    """Return groups of `xy` (n, 2), connected across twice the buildings' gap.
-
-    A roof may have holes.
-    """
+    """Return groups of `xy` (n, 2) across twice the gap, since a roof may have holes."""
     return connected_groups(xy, 2 * adapted_gap(xy))
 
 
@@ -380,10 +359,7 @@ def make_failed_place(index: np.ndarray, xyz: np.ndarray, error: Exception) -> R
 def find_houses(
     group: np.ndarray, xyz: np.ndarray, gap_m: float, split_houses: bool
 ) -> list[tuple[np.ndarray, shapely.Geometry]]:
-    """Return points (indices) and area of each house of a group of points.
-
-    It may be the whole group.
-    """
+    """Return points (indices) and area of each house of a group, or of the whole group."""
     area = cell_area(xyz[group, :2], gap_m / 2)
     if not split_houses:
         return [(group, area)]
@@ -396,10 +372,7 @@ def find_houses(
 
 
 def hull_area(xy: np.ndarray) -> float:
-    """Return the area of the points' convex hull, widened.
-
-    A roof is expected to reach a little beyond its outermost points.
-    """
+    """Return the area of the points' convex hull, widened as a roof reaches beyond them."""
     return (
         shapely.multipoints(xy).convex_hull.buffer(SPACINGS_BEYOND / np.sqrt(plan_density(xy))).area
     )

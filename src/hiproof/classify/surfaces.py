@@ -91,10 +91,7 @@ def thin_to_voxels(xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def fit_planes(groups: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Fit a plane to each group of points (v, k, 3).
-
-    Returns centre (v, 3), unit normal (v, 3) and residual (v,), one sigma.
-    """
+    """Fit planes to groups (v, k, 3): centre (v, 3), normal (v, 3) and residual (v,), 1 sigma."""
     centre = groups.mean(axis=1)
     offset = groups - centre[:, None]
     values, vectors = np.linalg.eigh(np.einsum("vki,vkj->vij", offset, offset) / groups.shape[1])
@@ -104,10 +101,7 @@ def fit_planes(groups: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def connect_voxels(
     xyz: np.ndarray, normal: np.ndarray, smooth: np.ndarray, neighbours: np.ndarray
 ) -> np.ndarray:
-    """Return the number (v,) of the surface of each voxel.
-
-    Neighbours are of one surface where both are smooth and lie in each other's plane.
-    """
+    """Number surfaces: smooth neighbouring voxels (v,) that lie in each other's plane."""
     item, other = np.repeat(np.arange(len(xyz)), neighbours.shape[1]), neighbours.ravel()
     mask = smooth[item] & smooth[other]
     item, other = item[mask], other[mask]

@@ -43,10 +43,7 @@ class CommandTable(Mapping[str, Any]):
 
 
 class Commands(click.Group):
-    """The commands in groups.
-
-    Complaints about wrong usage hold no password of an argument.
-    """
+    """The commands in groups; complaints about wrong usage hold no password of an argument."""
 
     def __init__(self, **attributes: Any) -> None:
         super().__init__(**attributes)

@@ -86,10 +86,7 @@ def check_file(
     say: Callable[[str], None] = click.echo,
     update: Update = lambda *_: None,
 ) -> CheckedFile:
-    """Check every solid of a file.
-
-    Prints a line for each invalid one and a count at the end.
-    """
+    """Print a line for each invalid solid of a file, and a count at the end."""
     from ..compose import check_solid
     from ..read.models.damage import SkippedBuildings
     from ..read.models.solids import read_solids

@@ -165,10 +165,7 @@ def print_full_help() -> None:
 
 
 def choose_level(quiet: bool, verbose: bool) -> Level:
-    """Return the level of the log that the options choose.
-
-    Raises SettingsError where both are given.
-    """
+    """Return the level of the log; both options together raise SettingsError."""
     if quiet and verbose:
         raise SettingsError("expected --quiet or --verbose, got both; leave one out")
     if verbose:

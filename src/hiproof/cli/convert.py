@@ -60,10 +60,7 @@ def convert(
 def convert_models(
     source: Path, path: Path, name: str, crs: str | None, update: Update, **given: Any
 ) -> tuple[str, SkippedBuildings]:
-    """Write the models of `source` to `path` in the format `name`.
-
-    Returns the result in a line, and what damage left out.
-    """
+    """Write the models of `source` to `path`; returns the result in a line and the damage."""
     from ..parametric.finished import open_run
     from ..write.described import write_format
 
@@ -76,10 +73,7 @@ def convert_models(
 
 
 def name_format(out: Path | None) -> str:
-    """Return the format in which a name ends.
-
-    Raises InputError where that is none.
-    """
+    """Return the format in which a name ends; raises InputError where that is none."""
     name = DEFAULT if out is None else choose_format(out.name)
     if name is None:
         suffixes = ", ".join(dict.fromkeys(Path(f.file).suffix for f in CONVERTED.values()))
@@ -90,10 +84,7 @@ def name_format(out: Path | None) -> str:
 
 
 def default_path(source: Path, name: str) -> Path:
-    """Return the path of a converted file without a name.
-
-    Raises InputError where a file of that name is one of the run itself.
-    """
+    """Return the path of a converted file without a name; a run's own is an InputError."""
     path = (source if source.is_dir() else source.parent) / CONVERTED[name].file
     if CONVERTED[name].fragment and path.exists():
         raise InputError(

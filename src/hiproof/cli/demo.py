@@ -31,10 +31,7 @@ def make_request(out: Path) -> Any:
 
 
 def refuse_other_run(folder: Path, cloud: str) -> None:
-    """Raise OutputError where the folder holds a run of other clouds.
-
-    The demo would replace it.
-    """
+    """Raise OutputError where the folder holds a run of other clouds, which would be lost."""
     from ..errors import OutputError
     from ..evaluate.run import run_record
 

@@ -19,11 +19,7 @@ def footprints(
     crs: str | None = None,
     config: Path | None = None,
 ) -> None:
-    """Fetch building footprints from Overture Maps (extra `parquet`).
-
-    The file holds all footprints in the extent of the clouds. Pass it to `hiproof reconstruct
-    --footprints`, which then needs no network connection.
-    """
+    """Write the footprints of the clouds' extent to `out`; returns their source."""
     if out.suffix.lower() != ".gpkg":
         raise SettingsError(f"expected --out to name a GeoPackage such as f.gpkg, got {out}")
     with show_progress("fetch"):

@@ -48,10 +48,7 @@ def graded_words(by_quality: Mapping[str, int]) -> str:
 
 
 def print_summary(summary: Summary, out: str) -> None:
-    """Print the result of a run.
-
-    It has models, how well they fit, what needs attention, and the files.
-    """
+    """Print the result of a run: models, how well they fit, what needs attention, files."""
     for line in describe_overview(summary.overview, summary.by_quality, out):
         click.echo(line)
     if summary.doubts:

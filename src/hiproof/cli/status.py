@@ -47,10 +47,7 @@ def status(folder: Path, *, as_json: bool = False) -> None:
 
 
 def read_state(ledger: Ledger) -> dict[str, Any]:
-    """Return the progress of a run, for `--json`.
-
-    It has tasks and buildings done, rate, summary and failures.
-    """
+    """Return the progress of a run for `--json`: tasks, buildings, rate, summary, failures."""
     tasks = ledger.tasks()
     sort, solve = ([task for task in tasks if task.kind == kind] for kind in ("sort", "solve"))
     finished, total = count_buildings(solve), sum(task.buildings for task in solve)
@@ -80,10 +77,7 @@ def count_buildings(tasks: list[Task]) -> int:
 
 
 def measure_rate(tasks: list[Task]) -> float | None:
-    """Return buildings a second between the first task done and the last.
-
-    It is None before there are two.
-    """
+    """Return buildings a second between the first and the last task done, None below two."""
     by_time = sorted((t.finished or 0.0, t.buildings) for t in tasks if t.state in CLOSED)
     if len(by_time) < 2 or (seconds := by_time[-1][0] - by_time[0][0]) <= 0:
         return None

@@ -70,10 +70,7 @@ def open_tiles(folder: Path, update: Update = ignore_progress) -> Iterator[Path]
 
 
 def make_tiles(folder: Path, tiles: Path, update: Update) -> str:
-    """Make the tiles of the run in a folder; returns the result in a line.
-
-    The page shows them about their own middle, where it matters to nobody how high the globe is.
-    """
+    """Make the tiles of the run in a folder, about their own middle; returns a line on it."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", module=r"hiproof\.write\.meshes\.tiles")
         return convert_models(folder, tiles, "3dtiles", None, update)[0]

@@ -44,10 +44,7 @@ def compiled(function: Callable) -> Any:
 
 @functools.cache
 def find_dispatcher() -> Callable | None:
-    """Return the dispatcher that keeps code, None if numba lacks what it needs.
-
-    Then a warning says so, and functions are compiled by plain `njit`, in every process.
-    """
+    """Return the dispatcher that keeps code; None, with a warning, if numba lacks what it needs."""
     try:
         from .dispatcher import Dispatcher
     except (ImportError, AttributeError) as error:

@@ -156,10 +156,7 @@ class Dispatcher(CPUDispatcher):
         return args, self.targetctx.codegen().magic_tuple()
 
     def get_call_template(self, args: tuple, kws: dict) -> tuple:
-        """Answer numba's question, when it compiles a caller, what a call returns.
-
-        Nothing is compiled apart for constants in the call.
-        """
+        """Tell numba what a call returns; constants in it have nothing compiled apart."""
         args = tuple(map(types.unliteral, args))
         kws = {name: types.unliteral(kind) for name, kind in kws.items()}
         python_signature, args = self.fold_argument_types(args, kws)

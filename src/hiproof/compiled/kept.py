@@ -107,10 +107,7 @@ def warn_not_kept() -> None:
 
 @functools.cache
 def remove_outdated(folder: Path, module: str, stamp: str) -> None:
-    """Remove this Python's code of another state of the module's sources.
-
-    Other Pythons still use theirs.
-    """
+    """Remove this Python's code, and no other's, of another state of the module's sources."""
     for file in folder.glob(f"{module}.*.{PYTHON}.*"):
         if f"-{stamp}-" not in file.name:
             file.unlink(missing_ok=True)

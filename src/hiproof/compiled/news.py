@@ -37,10 +37,7 @@ def headline(finished: int, total: int) -> str:
 
 
 class Lines:
-    """Progress as a few lines of the log.
-
-    The headline comes before anything is compiled, then a line at every further tenth.
-    """
+    """Progress as lines of the log: a headline, then a line at every further tenth."""
 
     def __init__(self, say: Callable[[str], None]):
         self.say = say

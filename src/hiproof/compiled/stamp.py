@@ -29,10 +29,7 @@ DECIDING = (HERE / "__init__.py", HERE / "dispatcher.py")
 
 @functools.cache
 def compute_stamp(file: Path) -> str:
-    """Return the stamp of a file, sixteen hexadecimal digits.
-
-    Files that cannot be read raise OSError.
-    """
+    """Return the stamp of a file, sixteen hexadecimal digits; raises OSError if unreadable."""
     return digest(closure(file))
 
 
@@ -54,10 +51,7 @@ def compiled_files() -> tuple[Path, ...]:
 
 
 def digest(files: Iterable[Path]) -> str:
-    """Return one stamp of several files.
-
-    It depends neither on their order nor on where their package lies.
-    """
+    """Return one stamp of several files, whatever their order and their package's place."""
     versions = [import_module(name).__version__ for name in VERSIONS]
     parts = [" ".join([PYTHON, *versions]).encode(), *sorted(map(digest_file, files))]
     return hashlib.sha256(b"".join(parts)).hexdigest()[:16]
@@ -108,10 +102,7 @@ def find_sources(path: Path) -> frozenset[Path]:
 
 @functools.cache
 def find_top_folder(file: Path) -> Path:
-    """Return the outermost folder of the package to which `file` belongs.
-
-    For a file outside packages it is the file itself without ending.
-    """
+    """Return the outermost folder of the package of `file`; outside packages, its own stem."""
     top = file.with_suffix("")
     while (top.parent / "__init__.py").exists():
         top = top.parent

@@ -42,10 +42,7 @@ def find_vertex_at(xy, items, x, y, reach):
 
 @compiled
 def is_beside(p, a, b, reach):
-    """Return whether `p` lies beside the inner part of segment ab.
-
-    It then is closer than `reach`.
-    """
+    """Return whether `p` lies beside the inner part of segment ab, closer than `reach`."""
     abx, aby, apx, apy = b[0] - a[0], b[1] - a[1], p[0] - a[0], p[1] - a[1]
     along, length2 = abx * apx + aby * apy, abx * abx + aby * aby
     if along <= 0 or along >= length2:
@@ -82,10 +79,7 @@ def find_vertex_near_segment(xy, items, a, b, reach):
 
 @compiled
 def turn(a, b, c):
-    """Return twice the signed area of triangle abc.
-
-    It is positive when c lies left of ab, and exact for integers.
-    """
+    """Return twice the signed area of triangle abc, exact for integers; left is positive."""
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
@@ -122,10 +116,7 @@ def crossing_point(a, b, c, d):
 
 @compiled
 def number_ends(segments, reach):
-    """Number the end points of the segments as vertices.
-
-    Returns xy with room to grow, their number, the ends (m, 2), and buckets of the vertices.
-    """
+    """Number the segments' end points: xy with room, their number, ends (m, 2), buckets."""
     size, r = len(segments), np.int64(reach) + 1
     xy, count = np.empty((2 * size + 16, 2), np.int64), 0
     ends, items = np.empty((size, 2), np.int64), np.empty(0, np.int64)
@@ -246,11 +237,7 @@ def find_previous(owner: np.ndarray) -> np.ndarray:
 
 
 class HalfEdges(NamedTuple):
-    """The half-edges (2e,) of an arrangement, and the faces on their left.
-
-    `order` sorts them by origin, then counter-clockwise. `follow` is the next one around the `face`
-    of each. Face 0 is unbounded. `area` (f,) is in square grid units.
-    """
+    """Half-edges (2e,) by origin, `follow` around each `face` on the left; face 0 is unbounded."""
 
     order: np.ndarray
     follow: np.ndarray
@@ -299,10 +286,7 @@ def edge_lengths(xy: np.ndarray, edges: np.ndarray) -> np.ndarray:
 def dissolve(
     xy: np.ndarray, edges: np.ndarray, side: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Drop edges with one label on both sides, then straight vertices.
-
-    Returns (xy, edges, side), compacted. `side` (e, 2) holds the labels left and right.
-    """
+    """Drop edges with one label (`side`: left, right), then straight vertices; compacted."""
     is_border = side[:, 0] != side[:, 1]
     edges = drop_straight_vertices(xy, edges[is_border])
     return renumber_vertices(xy, edges, side[is_border])
@@ -311,10 +295,7 @@ def dissolve(
 def renumber_vertices(
     xy: np.ndarray, edges: np.ndarray, side: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Renumber vertices in the order in which edges name them, without the unused ones.
-
-    Edges of negative vertices are left out.
-    """
+    """Renumber vertices in the order in which edges name them; edges below zero go."""
     is_live = edges[:, 0] >= 0
     used, first, number = np.unique(edges[is_live].ravel(), return_index=True, return_inverse=True)
     order = np.argsort(first)
@@ -505,10 +486,7 @@ def inside_intervals(soup, lower, upper, px, py, dx, dy):
 
 @compiled
 def clip_to_lowest(planes, lower, upper, j, px, py, dx, dy, t_low, t_high):
-    """Narrow [t_low, t_high] to where plane j is the lowest along the line.
-
-    It is among planes[lower:upper].
-    """
+    """Narrow [t_low, t_high] to where plane j is the lowest of planes[lower:upper] on the line."""
     for k in range(lower, upper):
         if k == j:
             continue
@@ -526,10 +504,7 @@ def clip_to_lowest(planes, lower, upper, j, px, py, dx, dy, t_low, t_high):
 
 @compiled
 def meeting_lines(soup, soup_start, planes, plane_start):
-    """Return the segments (m, 4) in plan along which the active plane changes.
-
-    They lie within a piece and between overlapping ones.
-    """
+    """Return the segments (m, 4) in plan along which the active plane changes."""
     out, count = np.empty((64, 4), np.int64), 0
     pieces = len(plane_start) - 1
     boxes = enclose_polygons(soup, soup_start[1:])

@@ -28,10 +28,7 @@ def grow_array(array):
 
 @compiled
 def append_row(rows, count, a, b):
-    """Append (a, b) to `rows` (m, 2), of which `count` are used.
-
-    Returns the rows and the count. Rows are copied where all were used.
-    """
+    """Append (a, b) to `rows`, of which `count` are used, or a copy; returns rows and count."""
     if count == len(rows):
         rows = grow_array(rows)
     rows[count, 0], rows[count, 1] = a, b
@@ -89,10 +86,7 @@ def enter_edge(e, xy, edges, buckets):
 
 @compiled
 def list_near(x_low, y_low, x_high, y_high, buckets, items):
-    """List the items whose buckets a box reaches into, an item perhaps several times.
-
-    Returns `items`, or a longer array, with the items, and their number.
-    """
+    """List items whose buckets meet a box, perhaps repeated, in `items` or longer; and count."""
     layout, first, links = buckets
     if len(items) < layout[5]:
         items = np.empty(len(links), np.int64)

@@ -43,10 +43,7 @@ class BuildingPart:
 
 
 class Border(NamedTuple):
-    """A plan edge of a roof face, which lies left of it.
-
-    It has the `face` and its vertices at the edge's ends.
-    """
+    """A plan edge of a roof face, which lies left of it: the `face`, its vertices at the ends."""
 
     face: int
     start: int
@@ -110,10 +107,7 @@ def place_vertices(solid: Solid) -> list[Place]:
 
 
 def plan_borders(solid: Solid, roofs: list[int], place_of: list[Place]) -> Borders:
-    """Return the border over each directed plan edge.
-
-    Its neighbour lies over the reversed edge.
-    """
+    """Return the border over each directed plan edge; its neighbour is over the reversed one."""
     return {
         (place_of[start], place_of[end]): Border(index, start, end)
         for index in roofs
@@ -141,10 +135,7 @@ def join_at_edges(roofs: list[int], borders: Borders) -> dict[int, int]:
 
 
 def merge_small(group_of: dict[int, int], solid: Solid, borders: Borders) -> list[set[int]]:
-    """Return the groups, those smaller than LEAST_PART_M2 merged into neighbours, smallest first.
-
-    The neighbour is the one with the longest common border.
-    """
+    """Merge groups below LEAST_PART_M2, smallest first, into that with most common border."""
     area = {index: solid.project_face(solid.faces[index]).area for index in group_of}
     while True:
         groups: dict[int, set[int]] = {}
@@ -168,10 +159,7 @@ def merge_small(group_of: dict[int, int], solid: Solid, borders: Borders) -> lis
 def cut_part(
     solid: Solid, group: set[int], borders: Borders, place_of: list[Place]
 ) -> BuildingPart:
-    """Return the part under the roof faces `group`.
-
-    It has these, the steps between them, walls down to the ground around them, and the ground.
-    """
+    """Return the part under roof faces `group`, with steps, walls to the ground, and ground."""
     part_borders = {edge: border for edge, border in borders.items() if border.face in group}
     vertices, levels = with_base(
         solid, {border.start for border in part_borders.values()}, place_of
@@ -217,10 +205,7 @@ def with_base(
 def make_wall_ring(
     edge: tuple[Place, Place], part_borders: Borders, levels: dict[Place, list[int]]
 ) -> tuple[int, ...]:
-    """Return the wall below a border, down to its neighbour or to the ground.
-
-    It goes through every level on its way. There is none where it lies lower.
-    """
+    """Return the wall below a border to its neighbour or the ground, by all levels, or none."""
     a, b = edge
     current, there = part_borders[edge], part_borders.get((b, a))
     low_a, low_b = (levels[a][0], levels[b][0]) if there is None else (there.end, there.start)

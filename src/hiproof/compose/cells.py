@@ -72,10 +72,7 @@ class PlanCells:
 
 
 def polygon_soups(polygons: list[shapely.Polygon]) -> list[np.ndarray]:
-    """Return the edges (m, 4) of all rings of each polygon, on the grid.
-
-    An item may be several polygons in one. Edges without length are left out.
-    """
+    """Return the edges (m, 4) of all rings of each polygon on the grid, none without length."""
     parts, polygon_of_part = shapely.get_parts(np.array(polygons, object), return_index=True)
     rings, part_of_ring = shapely.get_rings(parts, return_index=True)
     xy, ring = shapely.get_coordinates(rings, return_index=True)
@@ -93,10 +90,7 @@ def polygon_soups(polygons: list[shapely.Polygon]) -> list[np.ndarray]:
 
 
 def plan_problem(roof: Roof) -> PlanProblem:
-    """Return the roof on the grid.
-
-    Raises CompositionError when it has no outline, no pieces or planes that are not finite.
-    """
+    """Return the roof on the grid; raises CompositionError without outline, pieces or planes."""
     outline, *borders = polygon_soups([roof.outline, *(piece.outline for piece in roof.pieces)])
     part_of_piece = [index for index, part in enumerate(roof.parts) for _ in part.pieces]
     pieces = [
@@ -156,10 +150,7 @@ def stacked_soups(soups: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
 def arrange(
     problem: PlanProblem, reach: float, min_area_m2: float, min_width_m: float
 ) -> PlanCells:
-    """Return the plan cells of a roof, well separated by the `reach` (grid units).
-
-    Where no piece covers the outline, the piece beside it is extended.
-    """
+    """Return the plan cells of a roof, apart by the `reach`; pieces are extended over gaps."""
     for _ in range(4):
         cells = find_cells(problem, reach, min_area_m2 / GRID_M**2, min_width_m / GRID_M)
         if not (cells.side == UNCOVERED).any():
@@ -171,11 +162,7 @@ def arrange(
 
 
 def find_cells(problem: PlanProblem, reach: float, min_area: float, min_width: float) -> PlanCells:
-    """Return the cells of the plan in which one plane is active.
-
-    Cells too small are merged away, also uncovered ones. What remains UNCOVERED is for the caller
-    to see.
-    """
+    """Return the cells of one active plane, small ones merged; some may remain UNCOVERED."""
     outlines, planes = stacked_soups(problem.soups), (problem.planes, problem.plane_start)
     patches = stacked_soups([patch for patch, _ in problem.patches])
     patch_label = np.array([label for _, label in problem.patches], np.int64)
@@ -229,10 +216,7 @@ def is_clear(xy: np.ndarray, ends: list[list[int]], corners: list[int], reach: f
 
 
 def extend_over_gaps(problem: PlanProblem, cells: PlanCells) -> PlanProblem:
-    """Add a piece over each uncovered cell.
-
-    Its planes are those of the piece that the cell borders most.
-    """
+    """Add a piece over each uncovered cell with the planes of the piece that borders it most."""
     face, label = trace_faces(cells.xy, cells.edges).face, cells.side.ravel()
     for gap in np.unique(face[label == UNCOVERED]):
         indices = np.flatnonzero((face == gap) & (face[np.arange(len(face)) ^ 1] != gap))
@@ -242,10 +226,7 @@ def extend_over_gaps(problem: PlanProblem, cells: PlanCells) -> PlanProblem:
 
 
 def cover_gap(problem: PlanProblem, gap: np.ndarray, neighbour: np.ndarray) -> PlanProblem:
-    """Add a piece over the polygon `gap` (m, 4).
-
-    Its edges border cells labelled `neighbour` (m,).
-    """
+    """Add a piece over the polygon `gap` (m, 4), whose edges border cells `neighbour` (m,)."""
     length = np.hypot(gap[:, 2] - gap[:, 0], gap[:, 3] - gap[:, 1])
     piece_of_plane = (
         np.searchsorted(problem.plane_start, np.arange(len(problem.planes)), side="right") - 1
@@ -267,10 +248,7 @@ def cover_gap(problem: PlanProblem, gap: np.ndarray, neighbour: np.ndarray) -> P
 
 
 def nearest_piece(problem: PlanProblem, gap: np.ndarray) -> int:
-    """Return the piece whose border comes nearest to a gap's first corner.
-
-    `gap` (m, 4) are edges.
-    """
+    """Return the piece whose border comes nearest to the first corner of a `gap` (m, 4)."""
     corner = shapely.Point(gap[0, :2])
     borders = [shapely.multilinestrings(list(soup.reshape(-1, 2, 2))) for soup in problem.soups[1:]]
     return int(np.argmin([corner.distance(border) for border in borders]))

@@ -40,10 +40,7 @@ EARTH_M = 1e9  # coordinates beyond it are of no system in use, and their produc
 
 @dataclass(frozen=True)
 class Finding:
-    """One defect: val3dity's `code`, the `face`, and a `message`.
-
-    `face` is an index, -1 for the whole shell. The message is a sentence.
-    """
+    """A defect: val3dity's `code`, the `face` (-1: the whole shell), and a sentence `message`."""
 
     code: int
     face: int

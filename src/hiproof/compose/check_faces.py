@@ -40,11 +40,7 @@ class FacePlanes:
 
 
 def fit_planes(shell: FlatShell, normals: np.ndarray) -> FacePlanes:
-    """Fit a plane to each face by least squares.
-
-    `normals` (f, 3) are about right and are turned to the best; those of areas go far astray where
-    a face is long and thin.
-    """
+    """Fit a plane to each face by least squares; `normals` (f, 3) say which way it looks."""
     face_of = shell.face_of
     count = np.maximum(np.bincount(face_of, minlength=shell.faces), 1)[:, None]
     centres = shell.sum_by_face(shell.corners) / count
@@ -101,10 +97,7 @@ def check_faces(shell: FlatShell, planarity_m: float) -> tuple[np.ndarray, FaceP
 
 
 def find_contacts(shell: FlatShell, flat: np.ndarray, is_asked: np.ndarray) -> np.ndarray:
-    """Return the pairs (2, k) of edges of a face that meet, by their first corners.
-
-    Only faces (f,) that are asked for are looked at.
-    """
+    """Return the pairs (2, k) of edges that meet within a face asked for, by first corners."""
     edges = np.flatnonzero(is_asked[shell.face_of])
     step = np.ptp(flat[:, 0]) + 1.0  # faces are laid side by side, so that they meet no other
     places = flat + np.column_stack([shell.face_of * step, np.zeros(len(flat))])
@@ -169,10 +162,7 @@ def is_within(inner: shapely.Polygon, outer: shapely.Polygon) -> bool:
 def find_touches(
     shell: FlatShell, flat: np.ndarray, pairs: np.ndarray
 ) -> dict[tuple[int, int], set[tuple[float, ...]] | None]:
-    """Return where rings touch each other, by their numbers.
-
-    None stands for rings that cross or share a stretch.
-    """
+    """Return where rings touch each other, None where they cross or share a stretch."""
     one, two = pairs[:, shell.ring_of[pairs[0]] != shell.ring_of[pairs[1]]]
     a, b, c, d = (flat[k] for k in (one, shell.after[one], two, shell.after[two]))
     crosses = cross_strictly(a, b, c, d)
@@ -241,10 +231,7 @@ def measure_triangle_normals(
     start: np.ndarray,
     normals: np.ndarray,
 ) -> np.ndarray:
-    """Return the unit normals (t, 3) of triangles, zero without an area.
-
-    Triangles have `places` (t, 4, 2) in their face's plane. They face as the `normals` (k, 3) do.
-    """
+    """Return unit normals (t, 3) of `places` (t, 4, 2) in faces' planes, zero without area."""
     faces = np.repeat(np.arange(len(normals)), np.diff(start)).tolist()
     vertices = dict(zip(zip(faces, *flat.T.tolist(), strict=True), corners.tolist(), strict=True))
     first_vertices = corners[start[:-1]].tolist()
@@ -260,10 +247,7 @@ def measure_triangle_normals(
 
 
 def are_bent(normals: np.ndarray, owner: np.ndarray, face_normals: np.ndarray) -> np.ndarray:
-    """Return whether each face (k,) has two triangles over 20 degrees apart.
-
-    `normals` (t, 3) are those of the triangles, and `owner` (t,) is the face of each.
-    """
+    """Return whether faces (k,) have two triangles, `normals` (t, 3), over 20 degrees apart."""
     has_area = normals.any(axis=1)
     # Two triangles within 10 degrees of the face are within 20 of one another.
     aside = has_area & ((normals * face_normals[owner]).sum(axis=1) < SURELY_FLAT_COSINE)

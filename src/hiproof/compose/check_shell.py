@@ -25,10 +25,7 @@ def check_shell(shell: FlatShell, planes: FacePlanes) -> list[tuple[int, int, in
 
 
 def check_edges(shell: FlatShell) -> list[tuple[int, int, int]]:
-    """Find codes 302, 303, 307 and 305.
-
-    The first three want every edge twice, in opposite directions; 305 wants one component.
-    """
+    """Find codes 302, 303, 307 (every edge twice, oppositely) and 305 (one component)."""
     order = np.argsort(shell.edge_of, kind="stable")
     edges, start, uses = np.unique(shell.edge_of[order], return_index=True, return_counts=True)
     is_rising = shell.index < shell.index[shell.after]
@@ -62,10 +59,7 @@ def check_umbrellas(shell: FlatShell) -> list[tuple[int, int, int]]:
 
 
 def check_intersections(shell: FlatShell, planes: FacePlanes) -> list[tuple[int, int, int]]:
-    """Find code 306: faces that meet elsewhere than at shared edges or vertices.
-
-    Only those whose boxes meet are compared: edges of the one with the plane of the other.
-    """
+    """Find code 306: faces of meeting boxes that meet elsewhere than at shared edges."""
     starts = shell.ring_start[shell.face_start[:-1]]
     low = np.minimum.reduceat(shell.corners, starts)
     high = np.maximum.reduceat(shell.corners, starts)
@@ -119,10 +113,7 @@ def pierce(
     above: np.ndarray,
     slack: np.ndarray,
 ) -> np.ndarray:
-    """Return whether (k,) edges pierce a face, or lie in its plane and in its inside.
-
-    `above` (k, 2) is how high their ends lie over the plane of the `face` (k,).
-    """
+    """Return whether edges (k,), ends `above` (k, 2) a face's plane, pierce or lie in the face."""
     on_plane = np.abs(above) <= slack[:, None]
     in_plane = on_plane.all(axis=1)
     is_through = ~in_plane & (above.min(axis=1) < -slack) & (above.max(axis=1) > slack)
@@ -149,10 +140,7 @@ def pierce(
 def measure_depth(
     shell: FlatShell, planes: FacePlanes, face: np.ndarray, points: np.ndarray, is_asked: np.ndarray
 ) -> np.ndarray:
-    """Return how far inside the border of a face (k,) points (k, 2) lie that are asked for.
-
-    It is negative outside.
-    """
+    """Return how far inside the border of a face (k,) points (k, 2) lie, negative outside."""
     result = np.full(len(face), -np.inf)
     numbers, which = np.unique(face[is_asked], return_inverse=True)
     if len(numbers):

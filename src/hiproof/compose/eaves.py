@@ -32,10 +32,7 @@ CORNER_GAP_M = 0.002  # between corners of walls; rounding may part one corner b
 def set_walls_in(
     outline: shapely.Polygon, widths: np.ndarray, least_width_m: float
 ) -> shapely.Geometry:
-    """Return the areas within walls that stand `widths` (n,) inside an outline.
-
-    Walls that would stand less than `least_width_m` apart are left out: the roof there is a slab.
-    """
+    """Return areas of walls `widths` (n,) inside an outline, `least_width_m` apart at least."""
     strips = make_strips(list_outline_edges(outline), widths, side=-1.0)
     taken = [repair_polygons(shapely.polygons(strips[k])) for k in np.flatnonzero(widths)]
     rest = shapely.difference(outline, shapely.union_all(taken), grid_size=OVERLAY_GRID_M)
@@ -59,10 +56,7 @@ def tidy_walls(
 def join_walls(
     walls: shapely.Geometry, loose: shapely.Geometry, width_m: float
 ) -> shapely.Geometry:
-    """Return `walls` with what lies between those of loose roofs and others.
-
-    That is where the walls of both would meet if they grew by `width_m`.
-    """
+    """Return `walls` with what lies between loose roofs and others if grown by `width_m`."""
     joined = offset(offset(walls, width_m), -width_m)
     return shapely.union(walls, shapely.intersection(joined, offset(loose, width_m)))
 
@@ -98,10 +92,7 @@ THICKNESS_SHARES = (1.0, 0.95, 0.9)  # of a roof's thickness, tried until the so
 
 
 def add_eaves(model: Model, eaves: Eaves) -> Model:
-    """Return the model with `eaves`, its solid of LoD2.3 made.
-
-    Raises CompositionError where no valid solid comes out.
-    """
+    """Return the model with `eaves` in its LoD2.3; raises CompositionError if none is valid."""
     widths = np.zeros(len(list_outline_edges(model.roof.outline).starts))
     for overhang in eaves.overhangs:
         widths[overhang.edge] = overhang.length
@@ -246,10 +237,7 @@ def widen_piece(
 def find_stretches(
     area: shapely.Geometry, start: np.ndarray, end: np.ndarray
 ) -> list[tuple[float, float]]:
-    """Return the stretches of an edge within an area, as shares of its length.
-
-    The `area` was grown by PIECE_ENDS_M.
-    """
+    """Return the stretches of an edge in an area grown by PIECE_ENDS_M, as shares of length."""
     length = float(np.hypot(*(end - start)))
     shared = shapely.intersection(shapely.linestrings([start, end]), area)
     lines = [part for part in shapely.get_parts(shared) if part.geom_type == "LineString"]
@@ -277,10 +265,7 @@ def is_seen(
 def cut_strip(
     strip: np.ndarray, start: float, end: float, outline: shapely.Polygon
 ) -> shapely.Geometry:
-    """Return what lies beyond a stretch of an edge in its strip (4, 2).
-
-    What lies inside the outline is left out.
-    """
+    """Return what lies beyond a stretch of an edge in its strip (4, 2), outside the outline."""
     a, b, outer_b, outer_a = strip
     across = (outer_a - a) - ((outer_a - a) @ (b - a)) / ((b - a) @ (b - a)) * (b - a)
     corners = [
@@ -300,10 +285,7 @@ NO_ROOM = "the roof is too narrow for walls farther in"
 
 
 def add_valid_eaves(model: Model, eaves: Eaves) -> tuple[Model, str]:
-    """Return the model with as many of its `eaves` as make a valid solid.
-
-    Long ones come first. Why others were left out comes second.
-    """
+    """Return the model with as many `eaves` as are valid, long ones first; why not, second."""
     try:
         return add_eaves(model, eaves), NO_ROOM
     except CompositionError as error:

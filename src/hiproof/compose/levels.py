@@ -134,10 +134,7 @@ def stack_levels(
 
 
 def find_saddles(edges: np.ndarray, levels: Levels, label: np.ndarray) -> np.ndarray:
-    """Return the plan vertices that are no clean manifolds.
-
-    That is where the levels rise and fall more than once, or where one cell has two sectors.
-    """
+    """Return plan vertices where levels rise and fall twice, or a cell has two sectors."""
     origin, order, level = edges.ravel(), levels.order, levels.level
     rise = level[order] - level[order[find_previous(origin[order])]]
     climbing, at = rise[rise != 0] > 0, origin[order][rise != 0]

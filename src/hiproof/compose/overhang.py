@@ -38,11 +38,7 @@ SLIVER_STRIP_UNITS = 20.0  # 2 mm; strips between walls and roof edge thinner th
 
 
 class Step(NamedTuple):
-    """An upright face between two roof faces, over an edge in plan.
-
-    `places` are those on the edge from its start to its end. The higher face lies on their left,
-    and `low` and `high` are the heights of the face's lower and upper end over them.
-    """
+    """An upright face over `places` in plan from `low` to `high`, the higher roof on the left."""
 
     places: list[Place]
     low: list[int]
@@ -50,10 +46,7 @@ class Step(NamedTuple):
 
 
 class OverhangingShell(Shell):
-    """A solid while the slabs of its roof beyond the `walls` are made.
-
-    The walls' outline is in units of the grid, the `thickness` of slabs too.
-    """
+    """A solid while slabs, `thickness` in grid units, are made beyond the `walls`' outline."""
 
     on_edge_units = COLLINEAR_UNITS + 1.0  # walls of a composed solid bend by that without a corner
 
@@ -152,10 +145,7 @@ class OverhangingShell(Shell):
         return Step(places, low, high)
 
     def measure_slabs(self) -> None:
-        """Measure the height of each slab's ceiling over each of its places.
-
-        Heights that all but meet over a place are one.
-        """
+        """Measure each slab's ceiling over its places; heights that all but meet are one."""
         fixed: dict[Place, set[int]] = {}
         for x, y, z in (c for v, c in enumerate(self.grid) if v not in self.on_ground):
             fixed.setdefault((x, y), set()).add(z)
@@ -255,10 +245,7 @@ def find_slivers(cells: np.ndarray, walls: shapely.Geometry) -> np.ndarray:
 
 
 def weld_walls(walls: shapely.Geometry, roofs: list[shapely.Polygon]) -> shapely.Geometry:
-    """Return the walls' areas through all that is the same place of the roof's plan.
-
-    Their corners move onto corners and edges of `roofs`, and their edges pass through corners.
-    """
+    """Return the walls' areas with corners moved onto those and edges of `roofs`, and noded."""
     rings = [np.array(ring, float) for polygon in roofs for ring in list_rings(polygon)]
     corners = np.unique(np.concatenate(rings), axis=0)
     lines = np.concatenate([np.stack([r, np.roll(r, -1, axis=0)], axis=1) for r in rings])
@@ -277,10 +264,7 @@ def weld_wall(area: shapely.Polygon, corners: np.ndarray, lines: np.ndarray) -> 
 
 
 def weld_corner(place: Place, corners: np.ndarray, lines: np.ndarray) -> np.ndarray:
-    """Return the corner (n, 2) or place on a line (m, 2, 2) that a place is.
-
-    It is the place itself where it is neither.
-    """
+    """Return the corner (n, 2) or place on a line (m, 2, 2) at a place, else the place."""
     gaps = np.hypot(*(corners - place).T)
     if gaps.min() <= SAME_PLACE_UNITS:
         return corners[gaps.argmin()]

@@ -21,10 +21,7 @@ MOST_PARTS = 1000  # Parts of a building: a cathedral has some hundred, a faulty
 
 
 def compose_readable(roof: Roof, z_ground_local: float, settings: Settings) -> Solid:
-    """Compose a roof that its file of parameters will give again.
-
-    Raises CompositionError, as `compose` does, also for parts that the reader would refuse.
-    """
+    """Compose a roof that its file gives again; raises CompositionError if none, or unreadable."""
     visited: dict[tuple, int] = {}
     for index, part in enumerate(roof.parts):
         try:

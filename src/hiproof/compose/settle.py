@@ -28,20 +28,14 @@ PLAN_DIGITS = 4  # of outlines and the terrain: tenths of a millimetre, as solid
 
 
 def settled_roof(roof: Roof) -> Roof:
-    """Round the roof's outline and parts as they are written.
-
-    Its frame's origin is on whole millimetres already.
-    """
+    """Round the roof's outline and parts as written; its origin is on whole millimetres."""
     return replace(
         roof, parts=tuple(map(settled_part, roof.parts)), outline=settled_outline(roof.outline)
     )
 
 
 def settled_part(part: Part) -> Part:
-    """Round a part's parameters, position, rotation and pieces as written.
-
-    Its planes are made of them.
-    """
+    """Round a part's parameters, position and rotation as written; its planes follow."""
     parameters = {name: round_number(value) for name, value in part.parameters.items()}
     kappa = math.radians(round_number(math.degrees(part.kappa)))
     translation = np.array([round_number(value) for value in part.translation])
@@ -90,10 +84,7 @@ def make_pieces(
 
 
 def settled_sigma(sigma: Mapping[str, float]) -> dict[str, float]:
-    """Round standard deviations as they are written.
-
-    That of the rotation, `kappa` [rad], is in whole millionths of a degree.
-    """
+    """Round standard deviations as they are written, `kappa` [rad] to millionths of a degree."""
     return {
         name: math.radians(round_number(math.degrees(value)))
         if name == "kappa"

@@ -139,10 +139,7 @@ def roof_faces(
     xyz: list[list[float]],
     part: np.ndarray,
 ) -> list[Face]:
-    """Return one RoofSurface a cell.
-
-    It has its outer walk counter-clockwise from above, then its holes.
-    """
+    """Return a RoofSurface a cell: its outer walk counter-clockwise from above, then holes."""
     rings_of: dict[int, list[list[int]]] = {}
     label_of = {}
     for walk in walks(follow, [current != OUTSIDE for current in label]):
@@ -174,10 +171,7 @@ def ground_face(
 
 
 def wall_rises(follow: list[int], level: list[int]) -> dict[int, tuple[int, int, int, int]]:
-    """Return half-edges whose left cell stands above the right one.
-
-    With each come its levels: low, high at the origin, low, high at the end.
-    """
+    """Return half-edges whose left cell is higher, with low, high at the origin and the end."""
     rises = {}
     for h in range(len(follow)):
         low_u, high_u, low_v, high_v = (
@@ -197,10 +191,7 @@ def wall_runs(
     label: list[int],
     xyz: list[list[float]],
 ) -> list[list[int]]:
-    """Group half-edges with walls.
-
-    Consecutive ones on a straight stretch of the outline make one wall.
-    """
+    """Group half-edges with walls into runs along straight stretches of the outline."""
     outer = {follow[h ^ 1] ^ 1: h for h in rises if label[h ^ 1] == OUTSIDE}
     next_edges = {
         previous: h for previous, h in outer.items() if is_straight([previous, h], rises, xyz)
@@ -223,10 +214,7 @@ def wall_runs(
 def is_straight(
     run: list[int], rises: dict[int, tuple[int, int, int, int]], xyz: list[list[float]]
 ) -> bool:
-    """Return whether all ground vertices inside a run lie on one line.
-
-    The line connects the run's ends.
-    """
+    """Return whether all ground vertices inside a run lie on the line between its ends."""
     ax, ay, _ = xyz[rises[run[0]][0]]
     bx, by, _ = xyz[rises[run[-1]][2]]
     length = max(math.hypot(bx - ax, by - ay), 1.0)
@@ -240,10 +228,7 @@ def is_straight(
 
 
 def make_wall_ring(run: list[int], rises: dict[int, tuple[int, int, int, int]]) -> list[int]:
-    """Return the ring of the wall over a run of plan edges.
-
-    It is counter-clockwise seen from its right, through every level on the way.
-    """
+    """Return a wall's ring by every level, counter-clockwise from the right of its run."""
     low_u, high_u, _, _ = rises[run[0]]
     _, _, low_v, high_v = rises[run[-1]]
     ring = [low_u, *range(low_v, high_v)]
@@ -258,10 +243,7 @@ def make_wall_ring(run: list[int], rises: dict[int, tuple[int, int, int, int]]) 
 
 @dataclass(frozen=True)
 class Sectors:
-    """The cells around a plan vertex, counter-clockwise.
-
-    Sector k lies between arm k and the next.
-    """
+    """The cells around a plan vertex, counter-clockwise; sector k begins at arm k."""
 
     corner: np.ndarray
     angle: list[float]
@@ -280,10 +262,7 @@ class Sectors:
         return sum(self.opening[(run[0] + j) % len(self.opening)] for j in range(run[1]))
 
     def tip(self, run: tuple[int, int], radius: float) -> np.ndarray:
-        """Return the edges (m, 4) of the wedge over a run of sectors.
-
-        It is `radius` grid units long.
-        """
+        """Return the edges (m, 4) of the wedge, `radius` grid units long, over sectors of a run."""
         width = self.width(run)
         steps = (
             np.linspace(0, width, max(2, math.ceil(width / (np.pi / 3)) + 1)) + self.angle[run[0]]
@@ -339,10 +318,7 @@ def cure(sectors: Sectors, radius: float) -> tuple[np.ndarray, int]:
 
 
 def pinches(sectors: Sectors) -> list[tuple[float, tuple[int, int], int]]:
-    """Return (width, run, label) of what a cell that meets itself encloses.
-
-    Either side counts, as far as it is roofed.
-    """
+    """Return (width, run, label) of what a cell that meets itself encloses, where roofed."""
     result = []
     for cell in {
         face for face, label in zip(sectors.face, sectors.label, strict=True) if label != OUTSIDE

@@ -49,10 +49,7 @@ def compose_simpler(
 def simpler_roofs(
     roof: Roof, failing: tuple[int, ...], points: np.ndarray
 ) -> Iterator[tuple[float, Roof, str]]:
-    """Yield simpler roofs, without each part that fails, then without all.
-
-    With a roof come the share of points on it and what was given up.
-    """
+    """Yield simpler roofs with points' shares and what was given up: by failing part, then all."""
     if len(roof.parts) < 2:
         return
     for k in failing or range(len(roof.parts)):
@@ -65,10 +62,7 @@ def simpler_roofs(
 
 
 def level_part(part: Part, points: np.ndarray) -> Part:
-    """Return a flat part in the place of `part`.
-
-    It lies at the median height of its points, or at its own.
-    """
+    """Return a flat part in place of `part`, at its points' median height or at its own."""
     z = part.height_at(points[:, :2])
     z = points[np.isfinite(z) & (np.abs(z - points[:, 2]) < NEAR_M), 2]
     height = round(float(np.median(z)) if len(z) else float(part.translation[2]), 6)

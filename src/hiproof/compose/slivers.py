@@ -96,10 +96,7 @@ def choose_heir(
 
 
 def keep_largest_component(traced: HalfEdges, label: np.ndarray) -> None:
-    """Turn all but the largest connected inside to OUTSIDE, in `label` (f,).
-
-    A neck thinner than the reach has been cut.
-    """
+    """Turn all but the largest connected inside to OUTSIDE in `label` (f,), cut at necks."""
     sides, is_inside = traced.face.reshape(-1, 2), label != OUTSIDE
     component = label_components(len(label), sides[is_inside[sides].all(axis=1)].T)
     size = np.bincount(component, traced.area * is_inside)

@@ -106,10 +106,7 @@ def compose_at(
     reach: float,
     merges_walls: bool,
 ) -> Solid:
-    """Compose once, with vertices apart by the `reach` (grid units).
-
-    Corners where levels meet crosswise are set back, all of them in each round.
-    """
+    """Compose with vertices apart by the `reach`, setting back corners of crossing levels."""
     for number in range(MAX_ROUNDS):
         cells = arrange(problem, reach, options.min_face_area_m2, options.min_face_width_m)
         widening = 1 + 0.25 * number  # a cure may need room

@@ -42,10 +42,7 @@ Corner = tuple[int, int, int]
 
 
 class GroundCell(NamedTuple):
-    """A part of the ground in plan, with its `ceiling`.
-
-    The ceiling is a height in units of the grid, None on the ground itself.
-    """
+    """A part of the ground in plan with its `ceiling` in grid units, None on the ground."""
 
     polygon: shapely.Polygon
     ceiling: int | None
@@ -111,10 +108,7 @@ def fit_plane(solid: Solid, face: Face) -> np.ndarray:
 
 
 class Shell:
-    """A solid while its underside is made.
-
-    Places so near an edge lie on it: `on_edge_units`.
-    """
+    """A solid while its underside is made; places within `on_edge_units` lie on an edge."""
 
     on_edge_units = ON_EDGE_UNITS
 
@@ -163,10 +157,7 @@ class Shell:
         return bends
 
     def node_cells(self, ground: list[list[Place]]) -> list[list[list[Place]]]:
-        """Return the rings of all cells with every place that lies on their edges.
-
-        These are corners of the ground and of other cells, and where a wall's foot bends.
-        """
+        """Return rings of all cells with every place on their edges: corners and bends of walls."""
         rings = [list_rings(cell.polygon) for cell in self.cells]
         pool = {place for ring in [*ground, *itertools.chain(*rings)] for place in ring}
         self.pool = np.array(sorted(pool | self.bends))
@@ -329,10 +320,7 @@ def list_rings(polygon: shapely.Polygon) -> list[list[Place]]:
 
 
 def cut_cells(area: shapely.Polygon, passages: Iterable[Passage]) -> list[GroundCell]:
-    """Cut the ground, in units of the grid, into cells; of passages the first counts.
-
-    Slivers of ground beside a passage belong to it.
-    """
+    """Cut the ground into cells (grid units), the first passage first, slivers with theirs."""
     cells: list[GroundCell] = []
     rest: shapely.Geometry = area
     for passage in passages:
@@ -430,10 +418,7 @@ class Profile:
         )
 
     def place_knots(self, start: np.ndarray, end: np.ndarray) -> np.ndarray:
-        """Return places (k, 2) between two ends of a wall where its foot bends.
-
-        They are the same from either end.
-        """
+        """Return the places (k, 2), the same from either end, where a wall's foot bends."""
         if tuple(end) < tuple(start):
             start, end = end, start
         count = math.ceil(math.dist(start, end) / SPACING_M)
@@ -462,10 +447,7 @@ def find_bends(t: np.ndarray, z: np.ndarray, tolerance: float) -> list[int]:
 
 
 def add_underside(model: Model, underside: Underside) -> Model:
-    """Return the model with its `underside` made.
-
-    Raises CompositionError as `make_underside` does.
-    """
+    """Return the model with its `underside`; raises CompositionError as `make_underside`."""
     level = model.on_one_level
     if underside.is_level:
         return replace(model, solid=level, underside=underside, level_solid=None)
@@ -474,11 +456,7 @@ def add_underside(model: Model, underside: Underside) -> Model:
 
 
 def add_passage(model: Model, outline: shapely.Polygon, z_ceiling: float) -> Model:
-    """Return the model with one more passage.
-
-    Its `outline` is in the roof's frame, the height of its ceiling in the world. Raises
-    CompositionError as `make_underside` does.
-    """
+    """Return the model with a passage: `outline` in the roof's frame, ceiling in the world."""
     passage = Passage(outline, z_ceiling - float(model.roof.frame.origin[2]))
     passages = (*model.underside.passages, passage)
     return add_underside(model, replace(model.underside, passages=passages))
@@ -487,9 +465,6 @@ def add_passage(model: Model, outline: shapely.Polygon, z_ceiling: float) -> Mod
 def finish_solid(
     level: Solid, underside: Underside, origin: np.ndarray, compose: ComposeSettings | None = None
 ) -> Solid:
-    """Return a solid over one level (in the world) with its underside made.
-
-    The roof's frame begins at `origin` (3,).
-    """
+    """Return a solid over one level (in the world), its underside made; frame from `origin`."""
     local = Solid(np.round(level.vertices - origin, PLAN_DIGITS), level.faces)
     return make_underside(local, underside, compose or ComposeSettings()).move(origin)

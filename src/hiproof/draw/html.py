@@ -31,10 +31,7 @@ MM = 3  # digits of coordinates sent to the page: millimetres
 
 
 def render_building(building: Building) -> str:
-    """Return a building as HTML.
-
-    It has its view where it has a solid, its status, and the parameters of its parts.
-    """
+    """Return a building as HTML: its view where it has a solid, status, and parameters."""
     head = f"<b>{escape(building.id)}</b>: {escape(building.detail or building.status.value)}"
     view = render_view(building) if building.built is not None else ""
     style = "font-family:sans-serif;font-size:12px"
@@ -96,10 +93,7 @@ def parts_table(building: Building) -> str:
 
 
 def table_row(*cells: str) -> str:
-    """Return a row of HTML, aligned to the left.
-
-    Notebooks set cells of tables to the right, which is for numbers.
-    """
+    """Return a row of HTML, aligned to the left: notebooks align cells to the right."""
     return "<tr>" + "".join(f'<td style="text-align:left">{cell}</td>' for cell in cells) + "</tr>"
 
 

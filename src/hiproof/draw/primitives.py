@@ -39,10 +39,7 @@ LINE_COLOUR, TEXT_COLOUR = "#8c1c13", "#1a1a1a"
 
 @dataclass(frozen=True)
 class Measure:
-    """A parameter in the figure, from `start` to `end` (3,).
-
-    It is in the part's frame above the lowest eave. Without `end` it is a mark.
-    """
+    """A parameter in the figure from `start` to `end` (3,), without which it is a mark."""
 
     name: str
     start: np.ndarray
@@ -170,10 +167,7 @@ def face_path(face: SeenFace) -> str:
 
 
 def draw_measure(measure: Measure, page: list[np.ndarray]) -> str:
-    """Draw a line with its name beside it.
-
-    What has no length in the figure has a name alone.
-    """
+    """Draw a line with its name beside it, or the name alone of what has no length."""
     if len(page) < 2 or measure.length < 1e-9:
         x, y = page[0]
         text = f"{measure.name} = 0" if measure.end is not None else measure.name

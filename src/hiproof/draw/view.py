@@ -20,10 +20,7 @@ TURN_DEG, TILT_DEG = -35.0, 35.0
 
 @dataclass(frozen=True)
 class SeenFace:
-    """A face on the page: its rings (m, 2), colour and lightness.
-
-    y runs downwards. Lightness is 0 to 1.
-    """
+    """A face on the page (y downwards): rings (m, 2), colour, and lightness of 0 to 1."""
 
     rings: tuple[np.ndarray, ...]
     colour: str
@@ -32,10 +29,7 @@ class SeenFace:
 
 
 def project_points(xyz: np.ndarray, turn_deg: float, tilt_deg: float) -> np.ndarray:
-    """Return page coordinates and nearness (n, 3) of points.
-
-    They are seen from `tilt_deg` above the horizon, turned by `turn_deg`.
-    """
+    """Return page coordinates and nearness (n, 3), seen from `tilt_deg`, after `turn_deg`."""
     a, t = math.radians(turn_deg), math.radians(tilt_deg)
     x = xyz[:, 0] * math.cos(a) - xyz[:, 1] * math.sin(a)
     y = xyz[:, 0] * math.sin(a) + xyz[:, 1] * math.cos(a)
@@ -45,20 +39,14 @@ def project_points(xyz: np.ndarray, turn_deg: float, tilt_deg: float) -> np.ndar
 
 
 def bound_sphere(solid: Solid) -> tuple[np.ndarray, float]:
-    """Return the middle (3,) of a solid and the largest distance (m) from it.
-
-    The distance is that of a corner.
-    """
+    """Return the middle (3,) of a solid and the distance (m) of its farthest corner."""
     smallest, largest = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
     middle = (smallest + largest) / 2
     return middle, float(np.linalg.norm(solid.vertices - middle, axis=1).max())
 
 
 def choose_turn(building: Building) -> float:
-    """Return the degrees that turn a building to be seen from a corner.
-
-    Its main part may stand any way.
-    """
+    """Return the degrees that turn a building, however it lies, to be seen from a corner."""
     return TURN_DEG - math.degrees(building.parts[building.model.main].kappa)
 
 

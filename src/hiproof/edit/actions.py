@@ -110,10 +110,7 @@ def merge(record: Record, parts: list, requested: Record, points: np.ndarray) ->
 
 
 def dormer(record: Record, parts: list, requested: Record, points: np.ndarray) -> list:
-    """Add a dormer to part `part` at `place`, or half-way up its slope.
-
-    `place` is [x, y, z] about the origin.
-    """
+    """Add a dormer to part `part` at `place` [x, y, z] about the origin, or half-way up."""
     index = part_at(parts, requested, "part")
     roof = read_building(record)[1]
     return [*parts, add_dormer(roof, index, read_click(requested))] if roof is not None else parts

@@ -100,20 +100,14 @@ class Desk:
         }
 
     def record(self, id: str) -> tuple[dict[str, Any], dict[str, Any] | None, str]:
-        """Return a building's object, its override, and its version.
-
-        The object has what was accepted of it.
-        """
+        """Return a building's object as accepted, its override, and its version."""
         record, (override, version) = self.run.record(id), self.edits.of(id)
         if override and isinstance(override.get("parts"), list):
             record = record | {name: override[name] for name in BELONGS if name in override}
         return record, override, version
 
     def building(self, id: str) -> dict[str, Any]:
-        """Return a building as it is now.
-
-        It has its mesh and parts, or a sentence why there are none.
-        """
+        """Return a building as it is now, with mesh and parts, or a sentence why without."""
         record, override, version = self.record(id)
         authorship = {name: (override or {}).get(name) for name in ("who", "when", "note")}
         detail = finite(record.get("detail")) or ""
@@ -138,10 +132,7 @@ class Desk:
             return result | {"error": str(error)}
 
     def cloud(self, id: str) -> dict[str, Any]:
-        """Return the points drawn of a building, about the origin of its roof.
-
-        `missing` says why there are none.
-        """
+        """Return the points drawn, about the roof's origin; `missing` says why there are none."""
         record = self.record(id)[0]
         points = self.points.of(record)
         missing = self.points.missing or (
@@ -151,10 +142,7 @@ class Desk:
         return {"places": places, "count": len(points), "missing": missing}
 
     def draft(self, id: str, body: Mapping[str, Any]) -> dict[str, Any]:
-        """Return a building's object as the page has it.
-
-        It has its `parts`, and its `z_ground` where a person gave one.
-        """
+        """Return a building's object with the page's `parts`, and a person's `z_ground`."""
         record = self.record(id)[0] | {
             "parts": list_at(body, "parts"),
             "terrain_line": [],
@@ -167,10 +155,7 @@ class Desk:
         }
 
     def change(self, id: str, body: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the building with the page's `parts` after the edit `asked`.
-
-        While a hand drags (`dragged`) it is not measured.
-        """
+        """Return the building after the edit `asked`, unmeasured while a hand drags (`dragged`)."""
         record = self.draft(id, body)
         points = self.points.of(record)
         edit = apply_edit(
@@ -179,10 +164,7 @@ class Desk:
         return describe_building(edit, select_points(points))
 
     def alternatives(self, id: str, body: Mapping[str, Any]) -> dict[str, Any]:
-        """Return every type that part `part` may have, refitted.
-
-        Each has the share of points that it explains, the best first.
-        """
+        """Return every type that part `part` may have, refitted, by points that it explains."""
         record = self.draft(id, body)
         points, candidates = self.points.of(record), []
         for kind in CATALOGUE:
@@ -200,10 +182,7 @@ class Desk:
         return {"types": sorted(candidates, key=lambda row: -(row["share"] or 0.0))}
 
     def accept(self, id: str, body: Mapping[str, Any]) -> dict[str, Any]:
-        """Keep what the page has as an override of the building.
-
-        It has to be still of the `version` that the page knows.
-        """
+        """Keep the page's building as an override, if the page knows its `version`."""
         override = {
             "id": id,
             **(
@@ -218,10 +197,7 @@ class Desk:
         return {"version": self.edits.put(id, override, text_at(body, "version")), "when": current}
 
     def make_override(self, id: str, body: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the override of a building as the page has it.
-
-        It must be one that can be built.
-        """
+        """Return the override of a building as the page has it, which can be built."""
         nothing = np.zeros((0, 3))
         record = building_record(
             apply_edit(self.draft(id, body), {"action": "show"}, nothing, self.run.settings)
@@ -234,10 +210,7 @@ class Desk:
         return {name: record[name] for name in override}
 
     def make_exclusion(self, id: str) -> dict[str, Any]:
-        """Return the override that leaves a building without a model.
-
-        The building must be one of the run.
-        """
+        """Return the override that leaves a building of the run without a model."""
         self.run.record(id)
         return {"leave_out": True}
 
@@ -249,10 +222,7 @@ class Desk:
 
 @functools.cache
 def render_drawing(kind: str) -> str:
-    """Return the figure of a roof type with its parameters, as SVG.
-
-    Raises InputError for no type.
-    """
+    """Return the figure of a roof type as SVG; raises InputError for no type."""
     if kind not in CATALOGUE:
         raise InputError(
             f"expected a roof type ({', '.join(CATALOGUE)}), got {kind!r:.40}; choose one"
@@ -261,10 +231,7 @@ def render_drawing(kind: str) -> str:
 
 
 def names_of(row: BuildingRow) -> set[str]:
-    """Return the names under which `--only` finds a building.
-
-    They are its id and its kinds of attention.
-    """
+    """Return the names by which `--only` finds a building: its id and kinds of attention."""
     return {row.id, *(kind.code for kind in row.attention)}
 
 

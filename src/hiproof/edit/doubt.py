@@ -28,10 +28,7 @@ UNCERTAIN_CHANGE = 10.0  # more than all other scores together: a person has to 
 
 @dataclass(frozen=True)
 class BuildingDoubt:
-    """The doubt about a model: its `amount`, and `reasons`.
-
-    The amount is 0 where nothing speaks against the model; reasons are short phrases.
-    """
+    """The doubt about a model: its `amount`, 0 for none, and `reasons` in short phrases."""
 
     amount: float
     reasons: tuple[str, ...]
@@ -94,10 +91,7 @@ def is_loose(sigma: Mapping[str, float]) -> bool:
 
 
 def close_call(record: Mapping[str, Any]) -> tuple[float, str] | None:
-    """Score two types that are about as probable as each other.
-
-    The fits or the network say so.
-    """
+    """Score two types that the fits or the network take for about as probable."""
     types = record.get("types") or record.get("recognised") or {}
     ranked = sorted(((value or 0.0, name) for name, value in types.items()), reverse=True)
     if len(ranked) < 2 or ranked[0][0] - ranked[1][0] >= CLOSE_CALL:

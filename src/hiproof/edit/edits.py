@@ -98,10 +98,7 @@ class Edits:
 
 @contextmanager
 def lock_edits(path: Path) -> Iterator[None]:
-    """Lock the file at `path` for the block, against all processes.
-
-    SQLite locks, as for runs.
-    """
+    """Lock the file at `path` for the block, against all processes, by SQLite as for runs."""
     try:
         with closing(
             sqlite3.connect(

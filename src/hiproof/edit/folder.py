@@ -60,10 +60,7 @@ class RunFolder:
         self.by_id, self.stamp = {row.id: row for row in rows}, stamp
 
     def record(self, id: str) -> dict[str, Any]:
-        """Return the object of a building.
-
-        Raises InputError for one that the run does not have.
-        """
+        """Return the object of a building; raises InputError where the run does not have it."""
         self.refresh()
         row = self.by_id.get(id)
         if row is None:
@@ -113,10 +110,7 @@ def read_rows(path: Path) -> tuple[FileHead, list[BuildingRow]]:
 
 
 def read_row(number: int, record: Any, start: int, path: Path) -> BuildingRow:
-    """Return the row of a building's object.
-
-    One that cannot be read is the most doubtful.
-    """
+    """Return the row of a building's object, most doubtful where it cannot be read."""
     if not isinstance(record, dict) or not isinstance(record.get("id"), str):
         raise InputError(
             f"expected a building in line {number} of {path}, got {excerpt(record)}; mend it there"

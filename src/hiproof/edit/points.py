@@ -91,10 +91,7 @@ class RunPoints:
         return usable(result, outline)[0]
 
     def read_job(self, index: int, epochs: tuple[str, ...]) -> np.ndarray:
-        """Return points (n, 3) in and around the area of a building.
-
-        They are as many as the run would use, of the surveys in `epochs` where there are several.
-        """
+        """Return points (n, 3) around a building as a run uses, by survey for `epochs`."""
         job: Job = self.plan.jobs[index]
         surroundings = self.tile_points(self.tile_of[index]).choose({"epochs_used": epochs})
         points = surroundings.select_roof_points(surroundings.move(job)[0]).points
@@ -106,10 +103,7 @@ class RunPoints:
         )
 
     def read_tile(self, tile: str) -> SurveyPoints:
-        """Return all points that the buildings of a work tile may need, by survey.
-
-        Of files whose runs are noted only these are read.
-        """
+        """Return points that buildings of a work tile may need, by survey, of noted runs only."""
         reaches = Reaches(self.plan, {tile: self.plan.tiles[tile]})
         shifts = {survey.name: survey.shift for survey in self.surveys}
         clouds = [(survey.name, cloud) for survey in self.surveys for cloud in survey.clouds]
@@ -130,10 +124,7 @@ class RunPoints:
 
 
 def missing_reader() -> str:
-    """Return a sentence where the run's terrain model cannot be read.
-
-    A package is missing. It is empty otherwise.
-    """
+    """Return a sentence where a package to read the run's terrain is missing, else ""."""
     try:
         import_rasterio()
     except InputError as error:

@@ -22,10 +22,7 @@ PAGE_FIGURES = ("points", "share_within_20cm", "unexplained_area_m2", "rmse", "p
 
 
 def describe_building(building: Building, points: np.ndarray) -> dict[str, Any]:
-    """Return the building as JSON, all about the origin of its roof.
-
-    `points` (n, 3) are the world points drawn.
-    """
+    """Return the building and the `points` (n, 3) drawn as JSON about its roof's origin."""
     parts = building_record(building)["parts"]
     roof = building.roof
     local = roof.frame.to_local(points)
@@ -51,18 +48,12 @@ def describe_building(building: Building, points: np.ndarray) -> dict[str, Any]:
 
 
 def select_points(points: np.ndarray) -> np.ndarray:
-    """Return an even selection (m, 3) of the points.
-
-    They are as many as the page draws.
-    """
+    """Return an even selection (m, 3) of the points, as many as the page draws."""
     return points[:: max(1, -(-len(points) // MOST_PAGE_POINTS))]
 
 
 def place_handles(part: dict[str, Any]) -> dict[str, Any]:
-    """Return the handles of a part, about the origin.
-
-    They are its rectangle, its eave and its ridge.
-    """
+    """Return a part's handles about the origin: its rectangle, its eave and its ridge."""
     try:
         sized = with_sizes(part)
         width, length = (sized["parameters"][name] for name in ("width", "length"))
@@ -82,10 +73,7 @@ def place_handles(part: dict[str, Any]) -> dict[str, Any]:
 
 
 def make_mesh(building: Building) -> dict[str, str]:
-    """Return triangles of the solid, their parts, and the roof's edges.
-
-    They are about the origin; the part is the one that each roofs (-1: a wall).
-    """
+    """Return triangles about the origin, the part of each (-1: a wall), and roof edges."""
     mesh = solid_mesh(building.solid.move(-building.roof.frame.origin))
     return {
         "corners": pack_values(mesh.corners, "<f4"),

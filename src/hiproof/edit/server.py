@@ -39,10 +39,7 @@ EDIT_ASSETS = {
 
 
 class Service:
-    """Answers to requests: `answer` is all of it, without a socket.
-
-    `port` is where the server listens.
-    """
+    """Answers to requests on `port`, by `answer`, without a socket."""
 
     def __init__(self, desk: Desk, token: str | None = None) -> None:
         self.desk, self.token, self.port = desk, token or secrets.token_urlsafe(24), 0
@@ -70,10 +67,7 @@ class Service:
         return f"http://{LOOPBACK}:{self.port}/{self.token}/"
 
     def answer(self, method: str, target: str, headers: Headers, body: bytes = b"") -> Answer:
-        """Return the answer to a request.
-
-        A wrong one gets a sentence, never a traceback.
-        """
+        """Return the answer to a request; to a wrong one it is a sentence, no traceback."""
         try:
             refused = self.refusal(method, target, headers)
             if refused is not None:

@@ -283,10 +283,7 @@ def roofed_by(part: dict[str, Any]) -> shapely.Geometry:
 
 
 def cover_rectangle(part: dict[str, Any]) -> shapely.Polygon:
-    """Return the rectangle of a part in plan.
-
-    Raises InputError for values that are no numbers.
-    """
+    """Return the part without `area`; raises InputError where nothing is left of it."""
     numbers_by_name(part.get("parameters") or {}, "the parameters")
     place(part.get("position"), "position")
     number(part.get("rotation", 0.0), "rotation")

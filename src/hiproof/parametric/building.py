@@ -40,10 +40,7 @@ from .record import (
 
 
 def read_underside(record: Mapping[str, Any], building: Building, roof: Roof) -> Underside:
-    """Read the lower end of a building's solid, in the frame of its `roof`.
-
-    Raises InputError for what makes none.
-    """
+    """Return the rectangle of a part in plan; raises InputError for what are no numbers."""
     walls = record.get("walls", "level")
     if walls not in ("level", "terrain"):
         raise InputError(f"expected walls of level or terrain, got {excerpt(walls)}; choose one")
@@ -69,10 +66,7 @@ MOST_OVERHANG_M = 10.0  # longer ones are typing errors
 
 
 def read_eaves(record: Mapping[str, Any], roof: Roof) -> Eaves | None:
-    """Read the overhangs of a building's object, None where it has no list of them.
-
-    Raises InputError for one that its `roof` cannot have.
-    """
+    """Read the overhangs, None without a list; raises InputError for one that cannot be."""
     if record.get("overhangs") is None:
         return None
     kind = record.get("footprint_kind", WALLS)
@@ -173,10 +167,7 @@ def with_model(
     compose: ComposeSettings | None = None,
     underside: Underside = ONE_LEVEL,
 ) -> Building:
-    """Return the building with a model of its `roof`.
-
-    Raises CompositionError as `build` does.
-    """
+    """Return the building with a model of its `roof`; raises CompositionError as `build`."""
     from ..compose import compose as composed
 
     settings = dataclasses.replace(Settings(), compose=compose or ComposeSettings())

@@ -64,10 +64,7 @@ def changed_part(part: dict[str, Any], change: dict[str, Any], z_origin: float) 
 
 
 def from_lowest_eave(part: dict[str, Any]) -> dict[str, Any]:
-    """Return the part with its position at its lowest eave.
-
-    Where sides have their own eaves, all its heights count from there.
-    """
+    """Return the part at its lowest eave, from which all heights of its sides count."""
     parameters = part["parameters"]
     eaves = [name for name in parameters if name in SIDED and name.startswith("eave_")]
     smallest = min((measure(parameters[name], name) for name in eaves), default=0.0)
@@ -81,10 +78,7 @@ def from_lowest_eave(part: dict[str, Any]) -> dict[str, Any]:
 
 
 def with_sizes(part: dict[str, Any]) -> dict[str, Any]:
-    """Return the part with a width and a length.
-
-    A part without these gets those of the smallest rectangle around its outlines.
-    """
+    """Return the part with width and length, else of its outlines' smallest rectangle."""
     if all(name in part["parameters"] for name in PLAN_SIZES):
         return part
     outlines = shapely.union_all([make_polygon(outline) for outline in part["outlines"]])
@@ -104,18 +98,12 @@ def with_sizes(part: dict[str, Any]) -> dict[str, Any]:
 
 
 def make_polygon(rings: list[Any]) -> shapely.Geometry:
-    """Return the area of a part's outline, rings of (x, y), the outer first.
-
-    A spike without width has no area.
-    """
+    """Return the area of rings of (x, y), the outer first; a spike without width has none."""
     return repair_polygons(shapely.Polygon(rings[0], rings[1:]))
 
 
 def change_type(part: dict[str, Any], kind: str, sizes: dict[str, float]) -> dict[str, Any]:
-    """Return the part as another roof type with the same eave and rise.
-
-    It has the same rectangle, or one of other `sizes`.
-    """
+    """Return the part as another type of the same eave, rise and rectangle, or `sizes`."""
     if not isinstance(kind, str) or kind not in CATALOGUE:
         raise InputError(f"expected a roof type ({', '.join(CATALOGUE)}), got {kind!r}; choose one")
     width, length = (sizes.get(name, part["parameters"][name]) for name in PLAN_SIZES)
@@ -154,10 +142,7 @@ def measure_rise(part: dict[str, Any]) -> float:
 
 
 def measure_member_rise(member: Member) -> float:
-    """Return a member's greatest height over its base, within its rectangle.
-
-    Skews and cants do not count.
-    """
+    """Return a member's greatest height in its rectangle without skews and cants."""
     reach = []
     for axis in (0, 1):
         sides = [side for side in (2 * axis, 2 * axis + 1) if member.has[side]]
@@ -174,10 +159,7 @@ def measure_member_rise(member: Member) -> float:
 
 
 def with_ridge(part: dict[str, Any], z_ridge: float) -> dict[str, Any]:
-    """Return the part with its ridge or top at `z_ridge` about the origin.
-
-    Its eaves stay.
-    """
+    """Return the part with its ridge or top at `z_ridge` about the origin; eaves stay."""
     if part["type"] == "flat":
         return {**part, "position": [*part["position"][:2], z_ridge]}
     if not measure_rise(part) > 0.0:  # a roof without any slope has none that could be made steeper
@@ -207,10 +189,7 @@ def steeper_by(factor: float, pitch_deg: float) -> float:
 
 
 def scale_pitches(parameters: dict[str, float], kind: str, rise: float) -> dict[str, float]:
-    """Return pitches with which the ridge comes to `rise` over the lowest eave.
-
-    All slopes change by one factor.
-    """
+    """Return pitches, changed by one factor, with the ridge at `rise` over the lowest eave."""
     arguments = {name: value for name, value in parameters.items() if name.startswith("pitch_")}
 
     def pitches(factor: float) -> dict[str, float]:

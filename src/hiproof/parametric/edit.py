@@ -19,10 +19,7 @@ BY_HAND = "changed by hand"
 
 
 def with_part(building: Building, index: int, **change: Any) -> Building:
-    """Return the building with part `index` changed or added.
-
-    See `Building.with_part`.
-    """
+    """Return the building with part `index` changed or added; see `Building.with_part`."""
     z_origin, record = float(building.roof.frame.origin[2]), building_record(building)
     parts = record["parts"]
     change = {name: convert_to_plain(value) for name, value in change.items()}
@@ -64,10 +61,7 @@ def new_part(change: dict[str, Any], z_origin: float) -> dict[str, Any]:
 
 
 def without_part(building: Building, index: int) -> Building:
-    """Return the building without part `index`.
-
-    The part beside it roofs what this part alone roofed.
-    """
+    """Return the building without part `index`, whose roof the part beside it takes over."""
     count, record = len(building.roof.parts), building_record(building)
     if count < 2 or not 0 <= index < count:
         raise InputError(
@@ -79,10 +73,7 @@ def without_part(building: Building, index: int) -> Building:
 
 
 def rebuild(building: Building, record: dict[str, Any]) -> Building:
-    """Return the building of a changed record, composed as `building` was.
-
-    No figure of the earlier model stays.
-    """
+    """Return the building of a changed record, composed as it was, without old figures."""
     result = build(
         {**record, "status": Status.MODELLED.code, "quality": None, "detail": BY_HAND},
         building.model.compose,

@@ -32,10 +32,7 @@ WITHOUT_POINTS = (Status.NO_POINTS, Status.NO_ROOF)
 
 @dataclass(frozen=True)
 class FallbackHeights:
-    """Heights (m) that a footprint's attributes hold, None where unknown.
-
-    `block_m` is above the ground; `roof_m` and `ground_m` are in the world.
-    """
+    """Heights (m) of a footprint's attributes or None; `block_m` counts from the ground."""
 
     roof_m: float | None = None
     block_m: float | None = None
@@ -43,10 +40,7 @@ class FallbackHeights:
 
 
 def list_fallback_columns(read: ReadSettings) -> list[str]:
-    """Return the columns that fallback heights come from.
-
-    Raises SettingsError for a ground above the ground.
-    """
+    """Return the fallback columns; raises SettingsError for a ground above the ground."""
     if read.fallback_ground_height.startswith(ABOVE_GROUND):
         raise SettingsError(
             "expected a column of heights in the world as --fallback-ground-height, got "
@@ -125,10 +119,7 @@ def prefer_override(heights: FallbackHeights, override: Override) -> FallbackHei
 def build_block(
     building: Building, heights: FallbackHeights, terrain: Any, settings: Settings
 ) -> Building:
-    """Return the building as a block of known height.
-
-    Its ground is the terrain's, else that of its attributes.
-    """
+    """Return the building as a block over the terrain's ground, else its attributes'."""
     shift = np.array(building.shift)
     outline = shapely.transform(largest_polygon(building.footprint), lambda xy: xy + shift)
     frame = choose_frame(np.zeros((0, 3)), outline)

@@ -66,10 +66,7 @@ def opened_parameters(
 def objects(
     file: Any, path: str | os.PathLike[str], damaged: Damaged = refuse
 ) -> Iterator[tuple[int, Any]]:
-    """Yield (line, JSON value) of every line that is not blank.
-
-    A line that is reported to `damaged` comes as DAMAGED.
-    """
+    """Yield (line, JSON value) of lines that are not blank, DAMAGED where `damaged` took one."""
     for number, line in enumerate(file, 1):
         if line.strip():
             try:

@@ -94,10 +94,7 @@ def open_run(path: str | os.PathLike[str], crs: Any = None) -> Run:
 
 
 def read_file_head(file: Path, record: dict[str, Any], crs: Any = None) -> FileHead:
-    """Read what a file says of its models.
-
-    The CRS is `crs`, else that of the file, else that of `record`.
-    """
+    """Read the head of models; their CRS is `crs`, else that of the file, else of `record`."""
     if is_parameters(file):
         with opened_parameters(file) as (head, _):
             return head if crs is None else dataclasses.replace(head, crs=crs)
@@ -159,10 +156,7 @@ def read_solid_models(path: Path, head: FileHead, damaged: Damaged) -> Iterator[
 
 
 def make_building(model: BuildingModel) -> Building:
-    """Make the building of a model of unknown parameters.
-
-    A part of its roof has a piece for each of its faces.
-    """
+    """Make the building of a model without parameters, a piece for each face of its roof."""
     attributes = {plain_text(name): plain(value) for name, value in model.attributes.items()}
     code = model.status.upper()
     status = Status[code] if code in Status.__members__ else Status.MODELLED
@@ -182,10 +176,7 @@ def make_building(model: BuildingModel) -> Building:
 
 
 def name_faces(solid: Solid) -> Solid:
-    """Name the faces of a solid as roof and ground by where they look.
-
-    Faces that look up are its roof, where the file names no roof.
-    """
+    """Name faces that look up roof, where the file names none, and the others as they look."""
     if solid.select_faces(ROOF):
         return solid
     normals = ring_normals([solid.vertices[list(face.rings[0])] for face in solid.faces])
@@ -204,10 +195,7 @@ def list_parts(solid: Solid) -> list[int]:
 
 
 def trace_roof(solid: Solid, types: list[str]) -> Roof:
-    """Return the roof of a solid, traced from its faces.
-
-    Its parts have these `types`.
-    """
+    """Return the roof of a solid, traced from its faces, with parts of these `types`."""
     frame = LocalFrame(np.floor(solid.vertices.min(axis=0)))
     local = solid.move(-frame.origin)
     faces = local.select_faces(ROOF)

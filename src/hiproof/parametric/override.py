@@ -151,10 +151,7 @@ def read_override(record: Mapping[str, Any]) -> Override:
 
 
 def possible(record: Mapping[str, Any], key: str, where: str) -> float | None:
-    """Return the number that `record` has of `key`, None without one.
-
-    Raises InputError for one that no building can have.
-    """
+    """Return the number of `key`, None without one; InputError where no building has it."""
     if key not in record:
         return None
     value, (lower, upper) = number(record[key], f"{key} of {where}"), RANGES[key]
@@ -195,10 +192,7 @@ def refuse_contradictions(record: Mapping[str, Any], has_list: bool, where: str)
 
 
 def read_types(record: Mapping[str, Any], where: str) -> tuple[str, ...]:
-    """Read the types that parts may have, none where the override names none.
-
-    A text names several by commas.
-    """
+    """Read the types, commas between them, that parts may have, none without any."""
     given_types = record.get("types")
     names = given_types.split(",") if isinstance(given_types, str) else given_types
     if names is not None and not (isinstance(names, (list, tuple)) and names):
@@ -273,10 +267,7 @@ def overridden(
 
 
 def lies_under(building: Building, z_ground: float | None) -> bool:
-    """Return whether walls had to begin below the given ground.
-
-    Composing puts it under the lowest eave.
-    """
+    """Return whether the given ground lies above the walls' lower end."""
     if z_ground is None or building.built is None:
         return False
     return bool(building.solid.vertices[:, 2].min() < z_ground - 1e-3)

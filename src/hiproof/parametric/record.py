@@ -107,10 +107,7 @@ def read_status(record: Mapping[str, Any], has_parts: bool) -> Status:
 
 
 def read_outline(record: Mapping[str, Any]) -> shapely.Polygon | None:
-    """Read the outline of a building's roof, in world coordinates.
-
-    Returns None where there is none.
-    """
+    """Read the outline of a building's roof in world coordinates, None where there is none."""
     if not record.get("parts") or record.get("outline") is None or record.get("origin") is None:
         return None
     frame = LocalFrame(round_values(place(record["origin"], "origin"), DIGITS))
@@ -118,10 +115,7 @@ def read_outline(record: Mapping[str, Any]) -> shapely.Polygon | None:
 
 
 def on_grid(outline: shapely.Polygon) -> shapely.Polygon:
-    """Return the outline on the grid of solids.
-
-    Raises InputError where its rings cross.
-    """
+    """Return the outline on the grid of solids; raises InputError where its rings cross."""
     try:
         return settled_outline(outline)
     except shapely.GEOSException as error:
@@ -184,10 +178,7 @@ def read_part_outlines(
     outline: shapely.Polygon,
     label: str,
 ) -> list[shapely.Polygon]:
-    """Return the area that a part roofs.
-
-    It is the outlines given, else its plan's share of the building's outline.
-    """
+    """Return the outlines given of a part, else its plan's share of the building's outline."""
     if record.get("outlines") is None:
         return clip_plan(text_at(record, "type"), parameters, position, kappa, outline, label)
     return [polygon(rings, f"an outline of {label}") for rings in list_at(record, "outlines")]
@@ -201,10 +192,7 @@ def clip_plan(
     outline: shapely.Polygon,
     label: str,
 ) -> list[shapely.Polygon]:
-    """Return the polygons that the plan of a part covers of the outline.
-
-    It is a rectangle, or that of a round type.
-    """
+    """Return the polygons that a part's plan, a rectangle or round, covers of the outline."""
     if "width" not in parameters or "length" not in parameters:
         raise InputError(
             f"expected width and length, or outlines, of {label}, got neither; give the rectangle"
@@ -373,10 +361,7 @@ def read_quality(record: Mapping[str, Any]) -> Quality:
 
 
 def refuse_other_kinds(record: Mapping[str, Any]) -> None:
-    """Raise InputError where a value is of another kind than a run writes.
-
-    No geometry is made.
-    """
+    """Raise InputError where a value is of another kind than a run writes, without geometry."""
     parts = [
         require_mapping(part, f"part {index}")
         for index, part in enumerate(list_at(record, "parts"))

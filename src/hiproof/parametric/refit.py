@@ -47,10 +47,7 @@ UNBOUNDED_M = 100.0  # m; larger than any length of a roof: as good as no bound
 
 @dataclasses.dataclass(frozen=True)
 class Unknowns:
-    """The numbers that are fitted.
-
-    `names` are (part, parameter or "z"); start values and bounds are (p,).
-    """
+    """The numbers fitted: `names` are (part, parameter or "z"); start and bounds are (p,)."""
 
     names: tuple[tuple[int, str], ...]
     start: np.ndarray
@@ -77,10 +74,7 @@ def refit_parts_freely(building: Building) -> Building:
 
 
 def select_inside(roof: Roof, points: np.ndarray) -> np.ndarray:
-    """Return the `points` (n, 3) inside the outline, about the roof's origin.
-
-    They are given in world coordinates, and have to be finite.
-    """
+    """Return the finite world `points` inside the outline (n, 3), about the roof's origin."""
     local = roof.frame.to_local(as_xyz(points))
     local = local[np.isfinite(local).all(axis=1)]
     return local[shapely.intersects_xy(roof.outline, local[:, 0], local[:, 1])]
@@ -208,10 +202,7 @@ class Heights:
         return parameters, np.array([*part.translation[:2], values.get(Z, part.translation[2])])
 
     def planes(self, index: int, x: np.ndarray) -> list[np.ndarray] | None:
-        """Return the planes (k, 3) of each piece of a part.
-
-        It is None where the part's parameters make none.
-        """
+        """Return the planes (k, 3) of a part's pieces, None where its parameters make none."""
         part, (parameters, translation) = self.parts[index], self.place(index, x)
         try:
             refuse_no_shape(part.type, parameters, f"part {index}")
@@ -307,10 +298,7 @@ def fit_unknowns(
 
 
 def descend(heights: Heights, x: np.ndarray, scale: float) -> np.ndarray:
-    """Return the unknowns at the minimum of the misfit at this scale.
-
-    Damped steps each lessen it.
-    """
+    """Return the unknowns at the minimum of the misfit at this scale, by damped steps."""
     unknowns, damping = heights.unknowns, 1e-3
     surface = heights.at(x)
     cost, slopes = misfit(surface.gaps, scale), None
@@ -334,18 +322,12 @@ def descend(heights: Heights, x: np.ndarray, scale: float) -> np.ndarray:
 
 
 def misfit(gaps: np.ndarray, scale: float) -> float:
-    """Return the cost of the points (n,) at this scale.
-
-    It is Tukey's biweight, at most 1 a point.
-    """
+    """Return the cost of points (n,) by Tukey's biweight at this scale, at most 1 each."""
     return float((1.0 - np.clip(1.0 - (gaps / scale) ** 2, 0.0, None) ** 3).sum()) + 1e-9
 
 
 def covariance(jacobian: np.ndarray, gaps: np.ndarray) -> np.ndarray:
-    """Return the covariance (p, p) of the unknowns from points near the roof.
-
-    It is zero where they say nothing.
-    """
+    """Return the covariance (p, p) of the unknowns, zero without points near the roof."""
     if not len(gaps):
         return np.zeros((jacobian.shape[1],) * 2)
     return np.linalg.pinv(jacobian.T @ jacobian, rcond=1e-10) * float(np.mean(gaps**2))
@@ -354,10 +336,7 @@ def covariance(jacobian: np.ndarray, gaps: np.ndarray) -> np.ndarray:
 def with_values(
     part: dict[str, Any], values: Mapping[str, float], sigma: dict[str, float]
 ) -> dict[str, Any]:
-    """Return the part's object with fitted values.
-
-    Its position's z is that of its lowest eave again.
-    """
+    """Return the part's object with fitted values, its z at the lowest eave again."""
     parameters = {name: values.get(name, value) for name, value in part["parameters"].items()}
     x, y, z = part["position"]
     position = [x, y, values.get(Z, z)]
@@ -367,10 +346,7 @@ def with_values(
 
 
 def measure_building(building: Building, points_local: np.ndarray) -> Building:
-    """Return the building with its quality on `points_local` (n, 3).
-
-    The verdict on it comes with the quality.
-    """
+    """Return the building with its quality on `points_local` (n, 3), and its verdict."""
     from ..compose.settle import round_building
     from ..evaluate.metrics import quality
     from ..stages.judge import grade_building

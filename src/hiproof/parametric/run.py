@@ -141,10 +141,7 @@ class Maker:
         self.names = UniqueNames(), UniqueNames()
 
     def make(self, record: dict[str, Any]) -> tuple[Building, Fragments]:
-        """Return the building of an object, and its texts.
-
-        One that cannot be built has no model and keeps its parameters.
-        """
+        """Return an object's building and texts; without a model it keeps its parameters."""
         id = record["id"]
         names = self.names[0].take(plain_text(id)), self.names[1].take(gml_name(id))
         try:
@@ -183,10 +180,7 @@ def offset_by(record: Mapping[str, Any] | None, units: FileUnits) -> np.ndarray:
 
 
 def write_record(path: Path, out: Path, head: FileHead, built: Built) -> None:
-    """Write run.json: what was built from which file.
-
-    It has the clouds and footprints of the run that the file came from.
-    """
+    """Write run.json: what was built from which file, with the clouds and footprints of its run."""
     record = {
         "hiproof": __version__,
         **earlier_record(path.parent, head),

@@ -123,10 +123,7 @@ def describe_type(type: str) -> dict[str, Any]:
 
 
 def parameters_by_type() -> list[dict[str, Any]]:
-    """Return what the parameters of a part of each type must hold.
-
-    A part with each side's own parameters is free of this.
-    """
+    """Return what parameters of each type must hold, unless each side has its own."""
     sides = "(pitch|eave|skew)_(left|right|front|back)"
     cants = f"({'|'.join(MEASURES)})_cant[1-{MOST_CANTS}]"
     side_by_side = {"propertyNames": {"pattern": f"^(width|length|height|{sides}|{cants})$"}}

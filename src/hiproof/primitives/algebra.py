@@ -33,10 +33,7 @@ class Formula:
         return self.at((V, U, q0, q1, q2, q3))
 
     def at(self, shape: Sequence[Any] | np.ndarray) -> Any:
-        """Return the value at `shape` (6,): V, U, q0, q1, q2, q3.
-
-        Values are (m,) where the parameters are arrays (m,).
-        """
+        """Return the value at V, U, q0, q1, q2, q3: (6,), or arrays (m,) of these."""
         total: Any = 0.0
         for factor, powers in self.sparse:
             value: Any = factor
@@ -85,10 +82,7 @@ class Formula:
         )
 
     def __truediv__(self, other: Formula | float) -> Formula:
-        """Divide by one monomial.
-
-        A sum in the denominator has no finite form and raises ValueError.
-        """
+        """Divide by one monomial; a sum as the denominator raises ValueError."""
         (term,) = formula(other).terms
         return self * Formula(((1 / term[0], tuple(-power for power in term[1])),))
 

@@ -64,10 +64,7 @@ def name_cant_values(cants: np.ndarray, base: Any) -> dict[str, Any]:
 
 
 def read_cants(parameters: Mapping[str, float], base: float) -> np.ndarray:
-    """Read cants (4, c) from parameters by name, with T_L at the height `base`.
-
-    Raises KeyError where one is missing.
-    """
+    """Read cants (4, c) by name, T_L at the height `base`; raises KeyError if one is missing."""
     rows = [
         [parameters[f"{measure}_{cant}"] for measure in MEASURES] for cant in list_cants(parameters)
     ]

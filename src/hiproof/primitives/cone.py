@@ -19,10 +19,7 @@ HEXAGON_SIDES = 6  # Sides of the spires of pavilions and turrets that have neit
 
 
 def make_pointed(name: str, sides: int, apothem: float) -> Primitive:
-    """Return the shape of so many facets.
-
-    `apothem` is the inner radius of its plan where its half extents are 1.
-    """
+    """Return the shape of so many facets; `apothem` is its inner radius for half extents 1."""
     rim, facings = make_rim(sides, apothem), list_facings(sides)
     constants = {"sides": sides, "apothem": apothem, "rim": rim, "facings": facings}
     return make_shape(name, constants, rim=rim)

@@ -75,10 +75,7 @@ class DerivedStart:
 
 @dataclass(frozen=True)
 class Vote:
-    """Start values from a vote of the points.
-
-    The points vote on quarter turns, slopes and shifts of the ridge (shares of V).
-    """
+    """Start values from a vote on quarter turns, slopes and shifts of the ridge (shares of V)."""
 
     turns: int = 2
     slopes: tuple[float, ...] = (0.08, 0.2, 0.32, 0.45, 0.58, 0.72, 0.86, 1.0, 1.2)
@@ -175,18 +172,12 @@ class Primitive:
 
     @cached_property
     def is_of_family(self) -> bool:
-        """Whether it has at most one plane a side and one level plane.
-
-        Then a volume can have its shape.
-        """
+        """Whether a volume can have its shape: one plane a side, and one level plane, at most."""
         is_rectangular = self.strips == 1 and self.rim == RECTANGLE
         return is_rectangular and len(set(self.sides)) == len(self.sides)
 
     def variant(self, theta_p: Mapping[str, float]) -> Primitive:
-        """Return the variant with the teeth, facets or parameters of `theta_p`.
-
-        Returns the primitive itself where these name no other.
-        """
+        """Return the variant with the teeth, facets or parameters of `theta_p`, else itself."""
         if self.choose is not None:
             return self.variants[self.choose(theta_p)]
         if self.strips == 1:
@@ -203,10 +194,7 @@ class Primitive:
         )
 
     def vertices(self, theta_p: Mapping[str, float]) -> np.ndarray:
-        """Return the vertices (n, 3) in the primitive frame, S = f(theta_p).
-
-        Raises FitError where one is missing.
-        """
+        """Return vertices (n, 3) in the primitive frame, S = f(theta_p); FitError if one lacks."""
         shape = self.variant(theta_p)
         missing = [name for name in shape.parameters if name not in theta_p]
         if missing:
@@ -224,10 +212,7 @@ class Primitive:
         return self.typical(width, length, 0.5 * width * math.tan(math.radians(angle)))
 
     def from_member(self, member: Any) -> tuple[float, ...]:
-        """Return q of the shape with the slopes of a member's front and right.
-
-        Raises FitError for a shape that is of no family.
-        """
+        """Return q with the slopes of a member's front and right; FitError without a family."""
         if self.read_member is None:
             raise FitError(
                 f"expected a shape of at most one plane a side, got {self.name}; name its "
@@ -241,10 +226,7 @@ class Primitive:
         kappa: float = 0.0,
         translation: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0),
     ) -> np.ndarray:
-        """Return theta (9,) of a roof from its named parameters.
-
-        The roof is turned by `kappa` and moved to `translation`, T_L (3,).
-        """
+        """Return theta (9,) of named parameters, turned by `kappa` and moved by T_L (3,)."""
         theta = np.zeros(9)
         theta[[CX, CY, KAPPA]] = translation[0], translation[1], kappa
         theta[HALF_WIDTH:] = self.variant(theta_p).shape(theta_p)
@@ -258,10 +240,7 @@ class Primitive:
         return theta_p, float(theta[KAPPA]), np.array([theta[CX], theta[CY], eave])
 
     def measures_at(self, shape: Sequence[Any]) -> list[Any]:
-        """Return theta_p in order and the lowest eave's height at a `shape`.
-
-        `shape` is V, U, q0..q3, or several of them as arrays (m,).
-        """
+        """Return theta_p and the lowest eave's height at V, U, q0..q3, or at arrays (m,)."""
         return [measure.at(shape) for measure in (*self.measures.values(), self.eave)]
 
     def is_proper(self, theta: np.ndarray) -> bool:
@@ -288,20 +267,14 @@ class Primitive:
         )
 
     def canonical_theta(self, theta: np.ndarray) -> np.ndarray:
-        """Return the one theta of the same surface with axes in fixed roles.
-
-        kappa lies in (-pi/2, pi/2] or (-pi, pi].
-        """
+        """Return the theta of the same surface with kappa in (-pi/2, pi/2] or (-pi, pi]."""
         theta = self.canonical(np.array(theta, float))
         period = math.pi if self.half_turn_symmetric else 2 * math.pi
         theta[KAPPA] -= period * math.ceil(theta[KAPPA] / period - 0.5)
         return theta
 
     def plane_values(self, theta: np.ndarray) -> np.ndarray:
-        """Return the planes (k, 3) over u, v at `theta` (9,), in the order of `faces`.
-
-        A plane is z = a u + b v + c. Of several theta (m, 9), they are (m, k, 3).
-        """
+        """Return planes (k, 3), z = a u + b v + c, at `theta` (9,), or (m, k, 3) at (m, 9)."""
         theta = np.asarray(theta, float)
         shape = theta[HALF_WIDTH:].tolist() if theta.ndim == 1 else list(theta.T[HALF_WIDTH:])
         zero = 0.0 * theta[..., HALF_WIDTH]
@@ -316,10 +289,7 @@ class Primitive:
     def height_at(
         self, theta: np.ndarray, xy: np.ndarray, planes: np.ndarray | None = None
     ) -> np.ndarray:
-        """Return the height (n,) of the roof `theta`, or of its `planes`, at `xy` (n, 2).
-
-        The roof is continued beyond its plan rectangle.
-        """
+        """Return heights (n,) of `theta`, or its `planes`, at `xy` (n, 2), also beyond its plan."""
         planes = self.plane_values(theta) if planes is None else planes
         c, s = math.cos(theta[KAPPA]), math.sin(theta[KAPPA])
         xy_centred = np.asarray(xy, float) - theta[:2]
@@ -343,10 +313,7 @@ class Primitive:
         return planes
 
     def part(self, theta: np.ndarray, sigma: Mapping[str, float] | None = None) -> Part:
-        """Return the roof part of `theta` (9,), in theta's own frame.
-
-        It has one plan rectangle a tooth, or the shape's own plan, and planes over x, y.
-        """
+        """Return the part of `theta` (9,) in its frame, a rectangle a tooth, or its own plan."""
         theta_p, kappa, translation = self.from_theta(theta)
         c, s = math.cos(kappa), math.sin(kappa)
         planes = self.planes_at(theta)
@@ -383,19 +350,13 @@ class Primitive:
 
 
 def place_vertices(vertices: np.ndarray, kappa: float, translation: np.ndarray) -> np.ndarray:
-    """Turn vertices (n, 3) by `kappa` about Z and move them: R V + T_L, eq. 9.
-
-    `translation` is T_L (3,).
-    """
+    """Turn vertices (n, 3) by `kappa` about Z, and move by T_L (3,): R V + T_L, eq. 9."""
     c, s = math.cos(kappa), math.sin(kappa)
     return vertices @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) + translation
 
 
 def turn_quarter(theta: np.ndarray) -> np.ndarray:
-    """Exchange the plan axes by a quarter turn.
-
-    The caller exchanges the q that belong to them.
-    """
+    """Exchange the plan axes by a quarter turn; the caller exchanges their q."""
     theta = theta.copy()
     theta[[HALF_WIDTH, HALF_LENGTH]] = theta[[HALF_LENGTH, HALF_WIDTH]]
     theta[KAPPA] += math.pi / 2

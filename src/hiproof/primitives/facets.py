@@ -30,10 +30,7 @@ NUMERICAL_ZERO = 1e-12  # A smaller share is none.
 def with_facets(
     make: Callable[[int], Primitive], side_counts: tuple[int, ...] = SIDE_COUNTS, **changes: Any
 ) -> Primitive:
-    """Return a round shape with a variant for each number of sides.
-
-    The first of them is fitted, and the others follow from its size.
-    """
+    """Return a round shape with variants by number of sides, of which the first is fitted."""
     first, *rest = map(make, side_counts)
     return replace(first, more=tuple(replace(shape, starts=()) for shape in rest), **changes)
 
@@ -83,10 +80,7 @@ def list_facings(sides: int) -> list[tuple[float, float]]:
 
 
 def make_rim(sides: int, apothem: float) -> tuple[tuple[float, float], ...]:
-    """Return the corners of the polygon, the first facet's own first.
-
-    They are shares of the half extents, counter-clockwise.
-    """
+    """Return a polygon's corners in shares of half extents, counter-clockwise from a facet."""
     radius = apothem / math.cos(math.pi / sides)
     angles = [math.pi * (2 * k - 1) / sides for k in range(sides)]
     return tuple((radius * math.cos(angle), radius * math.sin(angle)) for angle in angles)
@@ -147,11 +141,7 @@ def draw_profile(around_axis: bool, splits: int = 1) -> ChordProfile:
 def raise_knots(
     knots: list[float], profile: Callable[[float], float], volume: float, around_axis: bool
 ) -> list[float]:
-    """Return the profile's values at the knots, those between its ends raised.
-
-    Chords between them hold the `volume` of the profile: its integral over r, or over r dr
-    `around_axis`.
-    """
+    """Return the profile at the knots, inner ones raised so that chords hold the `volume`."""
 
     def integrate(values: list[float]) -> float:
         total = 0.0

@@ -70,10 +70,7 @@ HALF_HIP_SHARE = 0.15
 
 
 def describe_sides(shape: Primitive) -> tuple[bool, int, int]:
-    """Return whether a shape has a top, and its numbers of planes along u and v.
-
-    The numbers count planes that rise along u and across v.
-    """
+    """Return whether a shape has a top, and its rising planes along u and across v."""
     along = sum(side in (LEFT, RIGHT) for side in shape.sides)
     return LEVEL in shape.sides, along, sum(side in (FRONT, BACK) for side in shape.sides)
 
@@ -164,10 +161,7 @@ class Member:
         )
 
     def compute_local_planes(self) -> list[tuple[float, float, float]]:
-        """Return the planes a, b, c over u, v about the centre.
-
-        They are those of the sides in order, of the cants, then the top.
-        """
+        """Return planes a, b, c over u, v about the centre: sides in order, cants, the top."""
         planes: list[tuple[float, float, float]] = []
         for side in self.sides:
             rise, along = SIGN[side] * self.slopes[side], self.leans[side] * self.slopes[side]
@@ -186,10 +180,7 @@ class Member:
         return planes
 
     def apex(self, axis: int) -> Any:
-        """Return the height at which the planes of the two sides across `axis` meet.
-
-        It is infinite where one of them is missing.
-        """
+        """Return the height where the two sides across `axis` meet, infinite without one."""
         side = 2 * axis
         if not (self.has[side] and self.has[side + 1]):
             return math.inf
@@ -204,10 +195,7 @@ class Member:
         return lower + item * run
 
     def turn(self, quarters: int = 1) -> Member:
-        """Return the same surface with axes turned by `quarters` times 90 degrees.
-
-        `quarters` is 0 to 3.
-        """
+        """Return the same surface with axes turned by `quarters` (0 to 3) times 90 degrees."""
         if quarters == 0:
             return self
         kappa = math.remainder(self.kappa + 0.5 * math.pi * quarters, 2.0 * math.pi)
@@ -230,10 +218,7 @@ class Member:
         )
 
     def canonical(self) -> Member:
-        """Return the same surface in the direction in which it is named.
-
-        The ridge runs along u, and the planes lie on the sides that SHAPES says.
-        """
+        """Return the same surface turned so that planes lie on the sides that SHAPES says."""
         return self.turn(self.quarter_turns)
 
     @cached_property
@@ -275,10 +260,7 @@ class Member:
         return (*(round(x, 6) for x in gap), not ahead)
 
     def lies_along(self, axis: int) -> bool:
-        """Return whether `axis` is the longer way.
-
-        The longer way is the ridge of the sides that meet lower, else that of the rectangle.
-        """
+        """Return whether `axis` is the longer way: the ridge of lower sides, else the side."""
         lower, upper = self.apex(1 - axis), self.apex(axis)
         if math.isfinite(lower) and math.isfinite(upper) and abs(lower - upper) > SAME:
             return lower < upper
@@ -310,10 +292,7 @@ class Member:
 
     @cached_property
     def in_catalogue(self) -> tuple[Primitive, np.ndarray] | None:
-        """The catalogue's shape of the same surface, and its canonical theta (9,).
-
-        The member has to be in its canonical direction.
-        """
+        """The catalogue's shape, and its canonical theta (9,), of a member in that direction."""
         if self.leans.any() or self.cants.shape[1]:
             return None
         local_planes = self.compute_local_planes()
@@ -335,10 +314,7 @@ class Member:
         return None
 
     def theta(self, shape: Primitive) -> np.ndarray:
-        """Return theta (9,) of the catalogue's `shape`, (9, m) of several.
-
-        The front and the right side count where the others equal these.
-        """
+        """Return theta (9,) or (9, m) of `shape`, whose front and right side stand for all."""
         theta = np.zeros((9, *self.eaves.shape[1:]))
         theta[:KAPPA], theta[KAPPA] = self.centre, self.kappa
         theta[HALF_WIDTH], theta[HALF_LENGTH] = self.half[1], self.half[0]
@@ -418,10 +394,7 @@ class Member:
         as_catalogue: bool,
         words: tuple[dict[str, float], float, np.ndarray],
     ) -> dict[str, float]:
-        """Return the standard deviations of a part's parameters and t_z by name.
-
-        `words` are the parameters by which the part describes this member.
-        """
+        """Return deviations of a part's parameters (`words`) and t_z by name."""
         parameters, kappa, translation = words
         shape = self.in_catalogue[0] if as_catalogue and self.in_catalogue is not None else None
         quantities = {**parameters, "t_z": float(translation[2])}
@@ -480,10 +453,7 @@ def compute_planes(
 def read_member(
     name: str, parameters: Mapping[str, float], kappa: float, translation: np.ndarray
 ) -> Member:
-    """Return the member of parameters: the catalogue's, or each side's own.
-
-    Raises FitError where one is missing.
-    """
+    """Read a member of the catalogue's or each side's parameters; FitError if one lacks."""
     if name not in CATALOGUE:
         raise FitError(
             f"expected a roof type ({', '.join(CATALOGUE)}), got {name!r}; choose one of these"

@@ -123,10 +123,7 @@ def list_parameters(kind: str) -> tuple[str, ...]:
 
 
 def list_side_parameters(kind: str) -> tuple[str, ...]:
-    """Return the names of each side's own parameters of a family member.
-
-    Skews and cants, which are rare, are left out.
-    """
+    """Return the names of each side's own parameters, without the rare skews and cants."""
     shape = CATALOGUE[kind]
     of_sides = [
         f"{subject}_{SIDES[side]}" for side in list_eaves(shape) for subject in ("pitch", "eave")

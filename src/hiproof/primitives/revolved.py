@@ -139,10 +139,7 @@ def make_dome(sides: int, splits: int = 1) -> Primitive:
 
 @cache
 def make_barrel(splits: int = 1) -> Primitive:
-    """Return the barrel vault: an arc across the width, straight along the length.
-
-    Each chord of the arc is split into so many.
-    """
+    """Return the barrel vault, straight along its length, each chord of its arc split."""
     profile = draw_profile(False, splits)
     shares = [-r for r in profile.knots[:0:-1]] + profile.knots
     heights = profile.heights[:0:-1] + profile.heights

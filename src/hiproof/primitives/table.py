@@ -66,10 +66,7 @@ def evaluate(
 
 
 def make_shape(key: str, constants: Mapping[str, Any] | None = None, **changes: Any) -> Primitive:
-    """Return the shape of a row with `changes` of the primitive's fields.
-
-    `constants`, such as a number of teeth, have a name in the row's expressions.
-    """
+    """Return a row's shape with `changes`; its expressions may name `constants`."""
     row, constants = SHAPE_ROWS[key], constants or {}
     symbols = {**FORMULAS, **constants}
     measures = {"width": 2 * V, "length": 2 * U} | {
