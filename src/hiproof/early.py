@@ -22,10 +22,7 @@ def end_at_once(*_: Any) -> None:
 
 
 def is_command() -> bool:
-    """Return whether this process was started as the command `hiproof`.
-
-    `python -m hiproof` counts too, a program that imports the package does not.
-    """
+    """Return whether this is the command `hiproof`, or `python -m hiproof`, not an importer."""
     started = os.path.basename(sys.argv[0]) if sys.argv else ""
     return started.removesuffix(".exe") == "hiproof" or (
         started == "-m" and "hiproof" in sys.orig_argv
@@ -36,10 +33,7 @@ IS_COMMAND = is_command()  # now, for `python -m` changes sys.argv once packages
 
 
 def end_at_once_on_interrupt() -> None:
-    """Let Ctrl-C end the command at once, until `interrupt_as_usual`.
-
-    Where Ctrl-C is ignored, it stays so.
-    """
+    """Let Ctrl-C, unless ignored, end the command at once, until `interrupt_as_usual`."""
     is_main = threading.current_thread() is threading.main_thread()
     if IS_COMMAND and is_main and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, end_at_once)

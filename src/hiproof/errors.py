@@ -14,10 +14,7 @@ from .masking import mask
 
 
 class HiproofError(Exception):
-    """Base of every error hiproof raises on purpose.
-
-    Its text is meant for the user, without a traceback.
-    """
+    """Base of every error hiproof raises on purpose, a text for the user without traceback."""
 
     def __init__(self, message: str = ""):
         super().__init__(mask(str(message)))
@@ -31,17 +28,11 @@ class InputError(HiproofError):
 
 
 class DamagedRaster(InputError):
-    """A terrain model of which a part cannot be read.
-
-    Every building on it needs it, so the run ends.
-    """
+    """A terrain model of which a part is unreadable; the run ends, as buildings need it."""
 
 
 class NoModelError(InputError):
-    """The model of a building that has none was requested.
-
-    `Building.built` is None there, and the status says why.
-    """
+    """A model was requested where there is none (`Building.built` is None); see the status."""
 
 
 class SettingsError(HiproofError):
@@ -53,10 +44,7 @@ class OutputError(HiproofError):
 
 
 class FitError(HiproofError):
-    """Points that determine no roof.
-
-    They are fewer than a plane needs, all in one place, or not finite.
-    """
+    """Points that determine no roof: too few for a plane, all in one place, or not finite."""
 
 
 class CompositionError(HiproofError):
@@ -85,20 +73,14 @@ def is_interrupt(error: BaseException) -> bool:
 
 
 class ErrorReport(NamedTuple):
-    """The record of an unexpected error.
-
-    It has one line with its place in the code, and the traceback.
-    """
+    """The record of an unexpected error: one line with its place in the code, the traceback."""
 
     detail: str
     trace: str
 
 
 def report_error(error: Exception) -> ErrorReport:
-    """Describe an error that one building or one place has alone.
-
-    MemoryError and Ctrl-C are raised again: they are not the fault of the building.
-    """
+    """Describe one building's own error; MemoryError and Ctrl-C, which are not, are raised."""
     if isinstance(error, MemoryError):
         raise error
     if is_interrupt(error):
@@ -127,7 +109,4 @@ class OutputWarning(HiproofWarning):
 
 
 class NotKeptWarning(HiproofWarning):
-    """Compiled functions cannot be kept; the message says what to do.
-
-    Every process compiles them again.
-    """
+    """Compiled functions cannot be kept, so every process compiles them; says what to do."""

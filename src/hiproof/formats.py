@@ -72,10 +72,7 @@ def list_requested_files(settings: Settings, folder: Path) -> dict[str, Path]:
 
 
 def list_requested_tile_files(settings: Settings, folder: Path, tile: str) -> dict[str, Path]:
-    """Return the paths of a work tile's own files, by format.
-
-    They lie in `folder`; there are none where such a run writes none.
-    """
+    """Return paths in `folder` of a work tile's files by format, none if a run writes none."""
     by_tile = settings.city.models != "merged"
     requested = {
         name: format
@@ -101,10 +98,7 @@ def list_model_paths(settings: Settings, folder: Path) -> list[Path]:
 
 
 def requested_fragments(write: WriteSettings) -> list[str]:
-    """Return the modules that make a building's parts of all files.
-
-    Files are those of such a run, those of its work tiles included.
-    """
+    """Return the modules that make a building's parts of all files, work tiles' included."""
     return list(dict.fromkeys(format.fragment for format in requested_formats(write).values()))
 
 

@@ -73,10 +73,7 @@ class LocalFrame:
 
     @classmethod
     def around(cls, points_world: np.ndarray) -> "LocalFrame":
-        """Return the frame at the centroid of `points_world` (n, 3).
-
-        It is rounded to the millimetre so that it writes out exactly.
-        """
+        """Return the frame at points' centroid, rounded to the millimetre to write out exactly."""
         return cls(np.round(np.asarray(points_world, float)[:, :3].mean(axis=0), 3))
 
     def to_local(self, world: np.ndarray) -> np.ndarray:
@@ -92,10 +89,7 @@ class LocalFrame:
 
 @dataclass(frozen=True)
 class PlanFrame:
-    """A roof's own axes: an origin (3,) in local coordinates, and a `rotation`.
-
-    `rotation` is (2, 2) with uv = rotation @ (xy - origin).
-    """
+    """A roof's axes: an origin (3,), a (2, 2) `rotation` with uv = rotation @ (xy - origin)."""
 
     origin: np.ndarray
     rotation: np.ndarray

@@ -56,20 +56,14 @@ class Masking(logging.Formatter):
 
 
 class Console(logging.Handler):
-    """Standard error at the time of each record.
-
-    A progress bar may have taken it over since.
-    """
+    """Standard error at the time of each record, which a progress bar may have replaced."""
 
     def emit(self, record: logging.LogRecord) -> None:
         print(self.format(record), file=sys.stderr, flush=True)
 
 
 class Elsewhere(logging.Handler):
-    """Messages of other packages: shown for `debug` alone.
-
-    They do not go straight to standard error.
-    """
+    """Messages of other packages: shown for `debug`, never straight on standard error."""
 
     def emit(self, record: logging.LogRecord) -> None:
         if not record.name.startswith(LOGGER.name):
@@ -77,10 +71,7 @@ class Elsewhere(logging.Handler):
 
 
 class KeptFile(logging.FileHandler):
-    """A log file that may fill its disk: the work then goes on without it.
-
-    That is logged once.
-    """
+    """A log file that may fill its disk: the work then goes on without it, logged once."""
 
     def handleError(self, record: logging.LogRecord) -> None:
         error = sys.exc_info()[1]
@@ -134,10 +125,7 @@ def make_handler(handler: logging.Handler, form: str, level: int) -> logging.Han
 
 
 def console_level() -> Level:
-    """Return the level from which the log is shown.
-
-    It is warning where nothing was started.
-    """
+    """Return the level from which the log is shown, warning where nothing was started."""
     console = find_console()
     return Level.warning if console is None else Level(logging.getLevelName(console.level).lower())
 
@@ -147,10 +135,7 @@ def find_console() -> Console | None:
 
 
 def worker_arguments() -> tuple:
-    """Return the arguments of `start` for a worker process.
-
-    With them it logs as this process does; there are none where nothing was started.
-    """
+    """Return the arguments of `start` for a worker to log as this process does, or none."""
     if find_console() is None:
         return ()
     file = next(
@@ -172,9 +157,6 @@ def log_warning(
     file: object = None,
     line: str | None = None,
 ) -> None:
-    """Log a warning as users read it, without its place in the source.
-
-    Other packages' warnings are for `debug`.
-    """
+    """Log a warning as users read it, without its source; others' packages' for `debug`."""
     level = logging.WARNING if issubclass(category, HiproofWarning) else logging.DEBUG
     LOGGER.log(level, " ".join(str(message).split()))

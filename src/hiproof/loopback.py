@@ -43,10 +43,7 @@ Headers = Mapping[str, str] | Message
 
 
 class Answer(NamedTuple):
-    """An HTTP answer: its code, its bytes, their type, and headers.
-
-    Headers replace those of SAFE.
-    """
+    """An HTTP answer: its code, bytes, their type, and headers in place of those of SAFE."""
 
     code: int
     body: bytes
@@ -128,10 +125,7 @@ def stop(*_: Any) -> None:
 
 
 class TimedReader(io.RawIOBase):
-    """A reader of a socket with a deadline.
-
-    It reads until `until` (by time.monotonic), which whoever sends byte by byte cannot put off.
-    """
+    """A socket's reader up to `until` (time.monotonic), however slowly bytes are sent."""
 
     def __init__(self, connection: socket.socket) -> None:
         self.connection, self.until = connection, 0.0
@@ -148,10 +142,7 @@ class TimedReader(io.RawIOBase):
 
 
 class LoopbackHandler(BaseHTTPRequestHandler):
-    """A handler of requests by this machine's own pages.
-
-    It sends what `answer` returns to them, and refuses others before.
-    """
+    """A handler that sends `answer` to this machine's own pages, and refuses others before."""
 
     protocol_version = "HTTP/1.1"
     # Without this the body waits until the browser has confirmed the head.
@@ -214,10 +205,7 @@ class LoopbackHandler(BaseHTTPRequestHandler):
             self.wfile.write(answer.body)
 
     def end_headers(self) -> None:
-        """End the head of every answer with headers that keep a page to itself.
-
-        Errors have them too.
-        """
+        """End every answer's head, errors' too, with headers that keep a page to itself."""
         if self.request_version != "HTTP/0.9":
             for name, value in {**SAFE, **getattr(self, "own", {})}.items():
                 self.send_header(name, value)

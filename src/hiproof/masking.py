@@ -130,10 +130,7 @@ def find_secrets(address: str) -> set[str]:
 
 
 def candidates(address: str) -> Iterator[str]:
-    """Yield what may be a secret of an address.
-
-    It is what follows a user's name up to an @, and values of named parameters.
-    """
+    """Yield possible secrets: what follows a user's name up to an @, and named parameters."""
     for remainder in {SCHEME.sub("", address, count=1), USER_LIKE_A_SCHEME.sub("", address)}:
         yield from before_an_at(remainder, address)
     for result in VALUE.finditer(address):
@@ -160,10 +157,7 @@ def before_an_at(remainder: str, address: str) -> Iterator[str]:
 
 
 def values_at(text: str) -> Iterator[str]:
-    """Yield what may be the value with which a parameter's text begins.
-
-    It is quoted, or goes up to the next parameter, or to the first sign.
-    """
+    """Yield possible values at a parameter's start: quoted, up to the next, or to a sign."""
     if not text:
         return
     if text[0] in "'\"":
@@ -178,10 +172,7 @@ def values_at(text: str) -> Iterator[str]:
 
 
 def list_forms(secret: str) -> set[str]:
-    """Return the forms in which a secret may be written.
-
-    They are as it is, decoded, encoded, and as programs quote texts and bytes.
-    """
+    """Return a secret's forms: as it is, decoded, encoded, and as programs quote it."""
     plain = {secret, unquote(secret), unquote_plus(secret)}
     encoded = {encode(text) for text in plain for encode in (quote, quote_plus)} | {
         quote(text, safe="") for text in plain
@@ -197,10 +188,7 @@ def list_forms(secret: str) -> set[str]:
 
 
 def make_pattern(form: str) -> str:
-    """Return the pattern that finds a form of a secret.
-
-    A short one, or one like a word, counts where no letter stands beside it.
-    """
+    """Return the pattern of a secret's form; a short one or a word must stand alone."""
     is_word = form.isalpha() and (form.islower() or form.isupper() or form.istitle())
     if len(form) >= WHOLE_WORD_BELOW and not is_word:
         return re.escape(form)

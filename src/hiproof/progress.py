@@ -75,10 +75,7 @@ def show_progress(stage: str) -> Iterator[Update]:
 
 @contextmanager
 def show_in_notebook(stage: str) -> Iterator[Update]:
-    """Yield the function that news goes to.
-
-    Bars are drawn in a notebook that can do so, and nothing elsewhere.
-    """
+    """Yield the function that gets news; it draws bars in a notebook that can show them."""
     if not is_notebook():
         yield ignore_progress
         return
@@ -111,10 +108,7 @@ def count_progress(
 
 
 class StageLines:
-    """A line when a stage begins, and one every LINE_S seconds meanwhile.
-
-    There is none before the command has run for FIRST_S.
-    """
+    """A line when a stage begins and every LINE_S seconds, none in the first FIRST_S."""
 
     def __init__(self, stage: str):
         self.stage, self.finished, self.first, self.start = stage, 0, 0, time.monotonic()

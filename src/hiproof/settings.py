@@ -62,10 +62,7 @@ class ReadSettings(Section):
 
     @property
     def by_class(self) -> bool:
-        """Whether roofs are the points of the building classes.
-
-        They are those of whole clouds or, with "auto", of clouds that have such classes.
-        """
+        """Whether roofs are points of building classes: of whole clouds, or "auto" with such."""
         return self.roofs in ("auto", "class")
 
 
@@ -190,18 +187,12 @@ class Settings:
 
     @classmethod
     def from_dict(cls, values: dict[str, dict[str, Any]]) -> Settings:
-        """Return settings with the given sections replaced.
-
-        Raises SettingsError for unknown names or values out of bounds.
-        """
+        """Return settings with sections replaced; SettingsError for unknown or bad values."""
         return cls().replace(values)
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Settings:
-        """Read settings from a TOML file with one table a section.
-
-        Raises SettingsError when it cannot be read.
-        """
+        """Read settings of TOML, a table a section; SettingsError when it cannot be read."""
         try:
             values = tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
         # undecodable, no TOML, or a number of 5,000 digits
@@ -253,10 +244,7 @@ class Settings:
         }
 
     def to_toml(self) -> str:
-        """Return TOML text with every setting, its unit, bounds and meaning.
-
-        The last three are comments.
-        """
+        """Return TOML of every setting, with its unit, bounds and meaning as comments."""
         lines = []
         for section_field in fields(self):
             section = getattr(self, section_field.name)
@@ -269,10 +257,7 @@ class Settings:
 
 
 def check_value(name: str, declared: dataclasses.Field[Any], value: Any) -> Any:
-    """Convert `value` to the declared setting's type.
-
-    Raises SettingsError with the full sentence when it does not fit.
-    """
+    """Convert `value` to the setting's type; SettingsError in a sentence if it does not fit."""
     default, metadata = declared.default, declared.metadata
     if not isinstance(default, tuple):
         return check_item(name, default, metadata, value)
@@ -294,10 +279,7 @@ SETTING_KINDS: dict[Any, object] = {
 
 
 def check_item(name: str, template: Any, declared: Any, value: Any) -> Any:
-    """Convert one value to the type of `template`, and check it.
-
-    It has to be within the bounds and among the choices declared.
-    """
+    """Convert a value to `template`'s type within its declared bounds and choices."""
     whole = isinstance(value, Integral) and not isinstance(value, bool)
     if isinstance(template, (bool, str)):
         fits = isinstance(value, type(template))
@@ -331,10 +313,7 @@ def check_item(name: str, template: Any, declared: Any, value: Any) -> Any:
 
 
 def format_value(value: Any) -> str:
-    """Format a value for a message, cut short.
-
-    Whole numbers of thousands of digits and long texts are cut.
-    """
+    """Format a value for a message, huge numbers and long texts cut short."""
     if isinstance(value, int) and abs(value) > LARGEST_INTEGER:
         return f"a number of more than {len(str(LARGEST_INTEGER)) - 1} digits"
     if isinstance(value, (list, tuple, dict)):

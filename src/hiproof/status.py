@@ -49,10 +49,7 @@ class Grade(Enum):
 
 
 class Doubt(Enum):
-    """The doubts that a building's detail may name, by the words in it.
-
-    A run counts them at its end.
-    """
+    """The doubts that a building's detail may name, by the words that a run counts."""
 
     TWO_SURFACES = "points lie on two surfaces"
     PLACES_WITHOUT_POINTS = "of its outline hold no points"

@@ -76,10 +76,7 @@ def measure_floors(
 
 
 def sum_floors(levels: RoofLevels, z_floors: np.ndarray, z_eave: float, storey_m: float) -> float:
-    """Return the area (m2) of full storeys and of the attics above them.
-
-    `z_floors` are the heights of the storeys' floors and of the last one's ceiling.
-    """
+    """Return the area (m2) of full storeys and attics between the heights `z_floors`."""
     attics = np.arange(max(z_eave, z_floors[-1]), levels.z_top, storey_m)
     floors = np.concatenate([z_floors[:-1], attics]) + HEADROOM_M
     floors[0] = min(floors[0], z_eave, levels.z_top)  # low sheds, too, have a floor
@@ -102,10 +99,7 @@ class RoofLevels:
 
 
 def find_ridge_direction(solid: Solid) -> float | None:
-    """Return the compass direction (degrees, 0 to 180) of the longest level ridge.
-
-    A ridge is an edge from which the roof faces on both sides fall away. None without one.
-    """
+    """Return the direction (degrees, 0 to 180) of the longest level ridge, None without one."""
     vectors = solid.shell.face_areas
     sides: dict[tuple[int, int], int] = {}
     for number, face in enumerate(solid.faces):
@@ -131,10 +125,7 @@ def tell_fall(vector: np.ndarray, along: np.ndarray) -> bool:
 
 
 class Answers(NamedTuple):
-    """A building, its walls cut along party walls, with what is added.
-
-    `attributes` are the building's, `surfaces` those of faces by number.
-    """
+    """A building with cut walls, added `attributes`, and `surfaces`, attributes by face."""
 
     building: Building
     attributes: dict[str, Any]
@@ -179,10 +170,7 @@ def answer(
 
 
 def describe_house(town: Town, number: int, areas: dict[str, float], use: Any) -> dict[str, Any]:
-    """Return type, storeys, volume and floor areas of building `number`.
-
-    `areas` are those of its surfaces.
-    """
+    """Return type, storeys, volume and floor areas of building `number` with surface `areas`."""
     building = town.read(number)
     figures = roof_figures(building.solid)
     z_ground = find_ground_height(building, figures)

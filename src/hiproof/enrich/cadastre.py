@@ -44,10 +44,7 @@ class ShadingEdges:
         return np.concatenate([*map(roof_edges, (building.solid, *list_objects(building)))])
 
     def find_shading_edges(self, number: int, z_low: float) -> np.ndarray:
-        """Return the edges (m, 2, 3) that shade places of building `number`.
-
-        The lowest of these places is at `z_low`.
-        """
+        """Find edges (m, 2, 3) that shade places, `z_low` or higher, of building `number`."""
         numbers = [number, *self.town.records.find_near(number, SHADE_REACH_M)]
         edges = np.concatenate([self.list_edges(k) for k in numbers])
         low_x, low_y, high_x, high_y = self.town.records.index.boxes[number]
@@ -266,10 +263,7 @@ def round_values(values: dict[str, float], digits: int) -> dict[str, Any]:
 
 
 def refuse_unusable(settings: EnrichSettings) -> None:
-    """Raise InputError where no run can be answered.
-
-    pvlib is missing, an option lacks another, or the horizon cannot be read.
-    """
+    """Raise InputError where pvlib, another option or the horizon is missing or unreadable."""
     if settings.sun:
         import_pvlib()
         if settings.horizon:
@@ -281,10 +275,7 @@ def refuse_unusable(settings: EnrichSettings) -> None:
 
 
 def refuse_unfit(records: Records, settings: EnrichSettings) -> None:
-    """Raise InputError where the sun of this run cannot be answered.
-
-    It has no CRS, or its weather or its terrain does not fit.
-    """
+    """Raise InputError where this run has no CRS, or its weather or terrain does not fit."""
     modelled = np.flatnonzero(records.index.modelled)
     if settings.sun and len(modelled):
         Cadastre(Town(records), settings).find_sky(int(modelled[0]))

@@ -66,11 +66,7 @@ def is_sound(solid: Solid) -> bool:
 def cut_polygon(
     polygon: shapely.Polygon, regions: Sequence[Region], thinnest: float
 ) -> list[Piece]:
-    """Cut a wall's polygon into party walls and the rest.
-
-    Where regions overlap the first counts. Strips thinner than `thinnest` (m) go to the other side
-    of the cut.
-    """
+    """Cut a wall into party walls, the first first, and the rest, none below `thinnest` (m)."""
     rest: shapely.Geometry = shapely.set_precision(polygon, GRID_M)
     party: list[Piece] = []
     for name, region in regions:
@@ -93,10 +89,7 @@ def list_parts(area: shapely.Geometry) -> list[shapely.Polygon]:
 
 
 def drop_thin(area: shapely.Geometry, thinnest: float) -> shapely.Geometry:
-    """Drop what is thinner than `thinnest` (m) of an area.
-
-    The area is shrunk, and grown again.
-    """
+    """Drop what is thinner than `thinnest` (m) of an area, which is shrunk and grown again."""
     half = thinnest / 2
     core = shapely.buffer(area, -half, join_style="mitre", mitre_limit=MOST_MITRE)
     grown = shapely.buffer(core, half, join_style="mitre", mitre_limit=MOST_MITRE)

@@ -29,10 +29,7 @@ BOUNDARY_TYPES = {ROOF: "roof", GROUND: "groundSlab"}
 
 
 def write_energy(sheet: Sheet) -> str:
-    """Return the ADE's properties of a building, which end its element.
-
-    A building without a model has none.
-    """
+    """Return the ADE's properties that end a building's element, none without a model."""
     if sheet.building.built is None:
         return ""
     values = sheet.attributes
@@ -67,10 +64,7 @@ def measure(name: str, kind: str, type: str, unit: str, value: float | None) -> 
 
 
 def write_zone(sheet: Sheet, measures: str) -> str:
-    """Return the thermal zone of a building, which is all of it.
-
-    It is heated unless the building is a shed or a garage.
-    """
+    """Return a building as one thermal zone, heated unless it is a shed or a garage."""
     name = sheet.gml_name
     own = choose_solid(sheet)  # that of LoD2.3 has other faces
     has_solid = sheet.head.write.has_lod2 and (own is None or own is sheet.building.solid)

@@ -108,10 +108,7 @@ def open_terrain(records: Records, path: str) -> tuple[RasterTerrain, np.ndarray
 def sample_terrain(
     terrain: RasterTerrain, low: np.ndarray, high: np.ndarray
 ) -> tuple[float, np.ndarray]:
-    """Return heights of a terrain on a grid in a box, -inf where they are unknown.
-
-    They come after the distance of the grid's places, which is as small as MOST_PLACES allow.
-    """
+    """Return heights of a terrain in a box, -inf where unknown, after the grid's spacing (m)."""
     spacing = max(FINEST_M, float(np.sqrt(np.prod(high - low) / MOST_PLACES)))
     x, y = (np.arange(a, b + spacing, spacing) for a, b in zip(low, high, strict=True))
     # row by row: a terrain model is read in tiles
@@ -177,8 +174,5 @@ def find_horizon(places: np.ndarray, edges: np.ndarray) -> np.ndarray:
 
 
 def measure_share(horizon: np.ndarray, sector: np.ndarray, tangent: np.ndarray) -> np.ndarray:
-    """Return the share (t,) of places that see each sun position.
-
-    Positions lie in `sector` (t,) at elevations of `tangent` (t,).
-    """
+    """Return the share (t,) of places that see the sun at `sector` (t,), `tangent` (t,)."""
     return (tangent > horizon[:, sector]).mean(axis=0)

@@ -41,10 +41,7 @@ def is_residential(use: Any) -> bool:
 
 
 def name_house_type(town: Town, number: int, floor_area_m2: float, use: Any) -> str | None:
-    """Return the type of building `number`, None for one that is no house.
-
-    `floor_area_m2` is its gross floor area.
-    """
+    """Return the type of building `number` by its gross floor area, None for no house."""
     if not is_house(town.read(number)) or not is_residential(use):
         return None
     neighbours = list_house_neighbours(town, number)

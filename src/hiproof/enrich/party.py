@@ -31,10 +31,7 @@ COS_MOST_ANGLE = math.cos(math.radians(MOST_ANGLE_DEG))
 
 
 class Contact(NamedTuple):
-    """A wall of one building that touches one of another.
-
-    `regions` are where they touch, in the plane of either wall; `area_m2` is measured midway.
-    """
+    """A wall that touches another's, at `regions` of either plane; `area_m2` is midway."""
 
     walls: tuple[Wall, Wall]
     regions: tuple[shapely.Geometry, shapely.Geometry]
@@ -148,10 +145,7 @@ class Town:
         return find_contacts(self.list_walls(number), self.list_walls(other), self.touch_m)
 
     def list_contacts(self, number: int) -> dict[int, tuple[Contact, ...]]:
-        """Return the contacts of a building's walls, by the number of its neighbour.
-
-        A pair is computed in one way only, so that both neighbours have the same areas.
-        """
+        """Return a building's contacts by neighbour, each pair computed in one way only."""
         result = {}
         for other in self.records.find_near(number, self.touch_m):
             if number < other:
@@ -166,9 +160,6 @@ class Town:
         return result
 
     def lacks_neighbours(self, number: int) -> bool:
-        """Return whether a neighbour of a building may lack a model.
-
-        A neighbour within reach has none, or the building is at the run's border.
-        """
+        """Return whether a neighbour has no model, or the building is at the run's border."""
         near = self.records.find_near(number, self.touch_m)
         return self.records.is_at_border(number) or not self.records.index.modelled[near].all()

@@ -48,10 +48,7 @@ class Index(NamedTuple):
 
 
 def index_records(path: Path) -> Index:
-    """Read the index of a parameters.jsonl.
-
-    Raises InputError for a line that cannot be read, and for two buildings of one id.
-    """
+    """Read the index of a parameters.jsonl; InputError for broken lines and repeated ids."""
     offsets, boxes, modelled = array("q"), array("d"), array("b")
     ids: set[str] = set()
     attributes: dict[str, None] = {}
@@ -129,10 +126,7 @@ class Records:
         return len(self.index.offsets)
 
     def compose(self, number: int) -> Building:
-        """Read and compose building `number`.
-
-        One that cannot be built has no model, and the reason as its detail.
-        """
+        """Read and compose building `number`, without a model and with a detail if it fails."""
         self.file.seek(int(self.index.offsets[number]))
         record = parse_record(self.file.readline(), f"building {number + 1} of {self.path}")
         try:
@@ -141,18 +135,12 @@ class Records:
             return Building(record["id"], Status.NOT_BUILT, mask(str(error)))
 
     def is_at_border(self, number: int) -> bool:
-        """Return whether a building lies within BORDER_M of the run's border.
-
-        The border is the convex hull of the outlines' boxes.
-        """
+        """Return whether a building lies within BORDER_M of the hull of all outlines' boxes."""
         box = self.index.boxes[number]
         return bool(np.isnan(box[0])) or not self.inside.contains(shapely.box(*box))
 
     def find_near(self, number: int, reach_m: float) -> list[int]:
-        """Return the buildings near `number`, in order.
-
-        Their boxes are within `reach_m` of its own.
-        """
+        """Return the buildings, in order, whose boxes are within `reach_m` of that of `number`."""
         low_x, low_y, high_x, high_y = self.index.boxes[number]
         if np.isnan(low_x):
             return []

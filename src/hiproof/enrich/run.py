@@ -53,10 +53,7 @@ FAILURE = "failure"
 
 
 class EnrichFailure(NamedTuple):
-    """A building that has no answers, with the reason.
-
-    `is_internal` is whether hiproof is to blame rather than the input.
-    """
+    """A building without answers and why; `is_internal` is whether hiproof is to blame."""
 
     id: str
     reason: str
@@ -70,10 +67,7 @@ def make_fragments(
     settings: EnrichSettings,
     cadastre: Cadastre | None = None,
 ) -> Fragments:
-    """Return the texts of building `number`, with all answers about it.
-
-    A building that fails stays as it was, and has the reason as an attribute.
-    """
+    """Return the texts and answers of building `number`, or its failure as an attribute."""
     result, failure = answer_or_fail(town, number, settings, cadastre)
     building, figures = result.building, measure_figures(result.building)
     attributes = building_attributes(
@@ -128,10 +122,7 @@ FOLDER, WAITING = "enriched", ".enrich"
 
 
 class Enriched(NamedTuple):
-    """The files that were written, and how many buildings they have.
-
-    `failures` are those without answers.
-    """
+    """The files that were written, their number of buildings, and those without answers."""
 
     files: list[Path]
     buildings: int
@@ -258,10 +249,7 @@ def enrich_block(
 def open_town(
     parameters: str, settings: EnrichSettings, index_file: str
 ) -> tuple[Town, Cadastre | None]:
-    """Open the run's buildings, and the sun on their roofs if asked.
-
-    It happens once in each process.
-    """
+    """Open the run's buildings, and the sun on their roofs if asked, once in each process."""
     with np.load(index_file, allow_pickle=False) as arrays:
         index = Index(**{name: arrays[name] for name in Index._fields})
     town = Town(Records(Path(parameters), index), settings.touch_m)
@@ -288,10 +276,7 @@ def find_head(records: Records, settings: EnrichSettings) -> FileHead:
 def join_blocks(
     blocks: list[tuple[Path, int, int]], head: FileHead, out: Path
 ) -> tuple[dict[str, Path], list[EnrichFailure]]:
-    """Join the texts of all blocks into files.
-
-    Returns these by format, and the buildings without answers.
-    """
+    """Join the texts of all blocks into files by format; returns failures, too."""
     failures: list[EnrichFailure] = []
     files = list_requested_files(Settings(write=head.write), out)
     del files["parameters"]

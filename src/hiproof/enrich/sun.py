@@ -26,11 +26,7 @@ MOST_SAMPLES = 64  # of a face; larger faces have points farther apart
 
 
 class Irradiation(NamedTuple):
-    """What a face gets in a year.
-
-    `by_month` (12,) is in kWh/m2; `shaded_share` is the share of the direct light that buildings
-    and terrain take away.
-    """
+    """What a face gets in a year; `shaded_share` is the direct light that others take away."""
 
     by_month: np.ndarray
     shaded_share: float
@@ -64,11 +60,7 @@ def irradiate(
 
 
 def measure_sky(normal: np.ndarray, horizon: np.ndarray) -> float:
-    """Return the sky's view factor of a plane, the mean of places (n, SECTORS).
-
-    It is the integral of the cosine to the normal over the sky above the horizon and the plane, by
-    pi.
-    """
+    """Return the view factor of the sky above a plane, and horizons (n, SECTORS), mean."""
     side = normal[0] * np.sin(MIDDLES) + normal[1] * np.cos(MIDDLES)
     plane = np.arctan2(np.maximum(-side, 0.0), normal[2])
     low = np.maximum(np.arctan(horizon), plane)
@@ -132,10 +124,7 @@ class Sky(NamedTuple):
 def make_sky(
     latitude: float, longitude: float, altitude: float, convergence: float, weather: str = ""
 ) -> Sky:
-    """Make the sky of a place (degrees, m).
-
-    `convergence` (degrees) is the direction of the run's grid north, clockwise from true north.
-    """
+    """Make the sky of a place (degrees, m); grid north is `convergence` off true north."""
     pvlib = import_pvlib()
     place = pvlib.location.Location(latitude, longitude, altitude=altitude)
     times, values = read_weather(weather, place) if weather else make_clear_sky(place)

@@ -89,10 +89,7 @@ def measure_nearest(points: np.ndarray, polygons: list[list[np.ndarray]]) -> np.
 
 
 def measure_vertically(points: np.ndarray, polygons: list[list[np.ndarray]]) -> np.ndarray:
-    """Return the least height (n,) between points (n, 3) and polygons.
-
-    Polygons count that lie over or under the point; it is inf where there is none.
-    """
+    """Return the least height (n,) to polygons over or under points (n, 3), inf without."""
     nearest = np.full(len(points), np.inf)
     for rings in polygons:
         normal, origin = fit_ring_plane(rings[0])
@@ -106,20 +103,14 @@ def measure_vertically(points: np.ndarray, polygons: list[list[np.ndarray]]) -> 
 
 
 def fit_ring_plane(ring: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return unit normal (Newell) and centroid of a ring.
-
-    The normal is zero for a ring without area.
-    """
+    """Return unit normal (Newell, zero without area) and centroid of a ring."""
     normal = ring_normal(ring)
     length = np.linalg.norm(normal)
     return (normal / length if length >= 1e-12 else np.zeros(3)), ring.mean(axis=0)
 
 
 def contains(rings: list[np.ndarray], kept: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Return whether points (n, 3) lie in a polygon, seen along the axis that is not `kept` (3,).
-
-    Holes are outside.
-    """
+    """Return whether points (n, 3) lie in a polygon with holes, seen along the dropped axis."""
     starts = np.concatenate(rings)[:, kept]
     ends = np.concatenate([np.roll(ring, -1, axis=0) for ring in rings])[:, kept]
     x, y = np.ascontiguousarray(points[:, kept].T)

@@ -32,10 +32,7 @@ TEXT_COLUMNS = ("id", "type", "status", "quality", "ref_id")
 
 @dataclass(frozen=True)
 class Comparison:
-    """The differences of a model from its reference.
-
-    They are in metres, degrees and cubic metres, NaN where either has no such figure.
-    """
+    """The differences of a model from its reference in m, degrees and m3, NaN if unknown."""
 
     reference_id: str
     ridge_height_m: float = float("nan")
@@ -82,11 +79,7 @@ def evaluate_building(
     footprint: shapely.Polygon | None = None,
     reference: BuildingModel | None = None,
 ) -> BuildingFigures:
-    """Return the figures of one model.
-
-    It is measured against its `points` (n, 3), its footprint and another model, all in world
-    metres.
-    """
+    """Return the figures of a model against `points` (n, 3), footprint and another model."""
     if model.solid is None:
         share = compute_share_within_20cm(
             np.full(len(points), np.inf), well_inside(points, footprint or shapely.Polygon())
@@ -113,10 +106,7 @@ def evaluate_building(
 
 
 def compare(solid: Solid, reference_id: str, reference: Solid) -> Comparison:
-    """Return the differences of two solids in one frame.
-
-    The azimuth's difference is the smaller angle, signed.
-    """
+    """Return the differences of two solids in one frame, that of azimuths signed and least."""
     from ..model.roof_figures import roof_figures
 
     if not (solid.select_faces(ROOF) and reference.select_faces(ROOF)):
@@ -138,10 +128,7 @@ def compare(solid: Solid, reference_id: str, reference: Solid) -> Comparison:
 def points_by_outline(
     points: np.ndarray, outlines: Sequence[shapely.Geometry | None]
 ) -> list[np.ndarray]:
-    """Return for each outline the points (m, 3) inside it.
-
-    Points keep the order of `points` (n, 3). An outline of None is empty.
-    """
+    """Return the points (m, 3) inside each outline in their order, none for None."""
     areas = np.array(
         [outline if outline is not None else shapely.Polygon() for outline in outlines],
         dtype=object,
@@ -180,10 +167,7 @@ def match_by_id_or_overlap(
 
 
 def summarise(figures: Sequence[BuildingFigures]) -> dict[str, dict[str, Any]]:
-    """Summarise figures, overall and per roof type.
-
-    A summary has the number of buildings, and mean, median and 90th percentile of every figure.
-    """
+    """Summarise figures: count, mean, median, 90th percentile, overall and per roof type."""
     groups = {"all": list(figures)}
     for kind in sorted({f.type for f in figures}):
         groups[kind] = [f for f in figures if f.type == kind]

@@ -19,11 +19,7 @@ from ..read.remote import is_url
 
 @dataclass(frozen=True)
 class RunSurvey:
-    """A survey of a run, with its clouds at their present places.
-
-    `name` is empty where the run has but one. `shift` (3,) in metres is what the run takes off its
-    points.
-    """
+    """A survey of a run, named if one of several, its `shift` (3,) (m) taken off points."""
 
     name: str
     clouds: tuple[str, ...]
@@ -67,10 +63,7 @@ class RunInputs:
 
     @property
     def footprint_file(self) -> str | None:
-        """The footprints, where they are a file of this machine.
-
-        An address in run.json has lost its password.
-        """
+        """The footprints, where they are a file here; an address has lost its password."""
         return None if self.footprints is None or is_url(self.footprints) else self.footprints
 
     @property

@@ -44,10 +44,7 @@ Polygons = Sequence[np.ndarray | Sequence[np.ndarray]]
 
 
 class Inner(NamedTuple):
-    """The points well inside an outline, and the area there.
-
-    They (n,) lie FACADE_M or more inside, where walls do not reflect.
-    """
+    """The points (n,) FACADE_M or more inside an outline, and the area there."""
 
     holds: np.ndarray
     area_m2: float
@@ -60,10 +57,7 @@ def well_inside(points: np.ndarray, outline: shapely.Geometry) -> Inner:
 
 
 def roof_polygons(model: Solid | Fit | Polygons) -> list[list[np.ndarray]]:
-    """Return a model's roof surfaces as lists of rings (m, 3), the outer first.
-
-    They are in the model's own frame.
-    """
+    """Return roof surfaces as lists of rings (m, 3), the outer first, in the model's frame."""
     if isinstance(model, Solid):
         return [
             [model.vertices[list(ring)] for ring in face.rings] for face in model.select_faces(ROOF)
@@ -90,10 +84,7 @@ def plan_outline(model: Solid | Fit | Polygons) -> shapely.Geometry:
 
 
 def psd(model: Solid | Fit | Polygons, points: np.ndarray) -> np.ndarray:
-    """Return the distance (n,) in metres of `points` (n, 3) to the roof.
-
-    It is that to the nearest bounded roof surface of `model`, in the same frame.
-    """
+    """Return the distance (n,) in m of `points` (n, 3) to the model's nearest roof surface."""
     return point_surface_distances(points, roof_polygons(model))
 
 
@@ -153,10 +144,7 @@ def quality(
 
 
 def compute_share_within_20cm(dz: np.ndarray, inner: Inner) -> float:
-    """Return the share of inner points with |dz| (n,) below 0.2 m.
-
-    It is NaN for fewer than ten.
-    """
+    """Return the share of inner points with |dz| (n,) below 0.2 m, NaN for fewer than ten."""
     well_inside = dz[inner.holds]
     return (
         float(np.mean(well_inside < NEAR_M))
@@ -202,10 +190,7 @@ def nodata_share(xy: np.ndarray, outline: shapely.Polygon) -> float:
 
 
 def unexplained_area(xy: np.ndarray, dz: np.ndarray) -> float:
-    """Return the area (m2) of 1 m cells whose points lie off the roof.
-
-    Most of their points `xy` (n, 2 or 3) lie more than half a metre off.
-    """
+    """Return the area (m2) of 1 m cells most of whose points lie half a metre off the roof."""
     cell = number_cells(np.floor(xy[:, :2] / CELL_M))[1]
     counts = np.bincount(cell, weights=dz > UNEXPLAINED_M)
     return float(np.count_nonzero(counts > np.bincount(cell) / 2) * CELL_M**2)

@@ -77,10 +77,7 @@ class BuildingModel:
 
 
 def run_models(folder: Path) -> Path:
-    """Return the path of the models in a run's output folder.
-
-    Raises InputError where there are none.
-    """
+    """Return the path of the models in a run's folder; raises InputError without any."""
     path, tiles = Path(folder) / RUN_MODELS, Path(folder) / TILE_FOLDER
     if not path.is_file() and any(tiles.glob(f"*{FORMATS['cityjson'].tile_ending}")):
         raise InputError(
@@ -184,10 +181,7 @@ def plain_attributes(attributes: Any) -> dict[str, Any]:
 
 
 def usable(model: BuildingModel, must_be_valid: bool) -> BuildingModel:
-    """Return the model if it can be used.
-
-    Raises ValueError if its solid cannot be drawn, or must be valid and is not.
-    """
+    """Return a usable model; raises ValueError if it cannot be drawn, or must be valid."""
     if model.solid is None:
         return model
     findings = check_solid(model.solid) if must_be_valid else []
@@ -202,10 +196,7 @@ def usable(model: BuildingModel, must_be_valid: bool) -> BuildingModel:
 
 
 def join_shells(solid: Solid, family: list[dict[str, Any]]) -> Solid:
-    """Join the shells of building parts that hiproof cut into one.
-
-    The walls between them go.
-    """
+    """Join the shells of building parts into one, without the walls between them."""
     part_solids = [
         member for member in family if f"{OWN}primitives" in (member.get("attributes") or {})
     ]
@@ -255,10 +246,7 @@ def read_level(geometry: dict[str, Any]) -> float:
 
 
 def compact(vertices: np.ndarray, faces: tuple[Face, ...]) -> Solid:
-    """Return a solid with only the vertices that its faces use.
-
-    Each of these must be a place; raises ValueError otherwise.
-    """
+    """Return a solid of the vertices that faces use; ValueError if one is no place."""
     smallest = min(len(set(ring)) for face in faces for ring in (face.rings or ((),)))
     if smallest < 3:
         raise ValueError(f"a ring of {smallest} points")

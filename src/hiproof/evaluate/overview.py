@@ -15,11 +15,7 @@ from ..status import MOSTLY_OFF, Attention, Status, find_attention
 
 
 class BuildingOutcome(NamedTuple):
-    """The outcome of a building.
-
-    It has the codes of its status and grade, its detail, and its share of roof points within 0.2 m
-    of the roof, None where it is unknown.
-    """
+    """A building's codes of status and grade, detail, and share of points within 0.2 m or None."""
 
     status: str
     quality: str | None
@@ -108,8 +104,5 @@ def is_modelled(outcome: BuildingOutcome) -> bool:
 
 
 def show_command(folder: str, kind: Attention) -> str:
-    """Return the command that shows buildings that need this attention.
-
-    They are those of a run.
-    """
+    """Return the command that shows the run's buildings that need this attention."""
     return f"hiproof edit {folder} --only {kind.code}"

@@ -110,11 +110,7 @@ def report_html(
     most_shown: int = MOST_SHOWN,
     changes: tuple[str, list[dict[str, Any]]] = ("", []),
 ) -> str:
-    """Return the page as text.
-
-    Tables and distributions count every building; of more than `most_shown`, map and 3D view show
-    the worst and an even selection of the others.
-    """
+    """Return the page as text, its map of `most_shown` buildings, all of them in tables."""
     worst = worst_indices(run)
     buildings = choose_buildings(run, worst, most_shown)
     places = run.only(buildings)
@@ -183,10 +179,7 @@ def list_next_steps(run: EvaluatedRun) -> str:
 
 
 def attention_list(run: EvaluatedRun) -> str:
-    """Return the buildings that need attention, by kind.
-
-    Each kind has the command that shows them.
-    """
+    """Return the buildings that need attention by kind, with the command that shows them."""
     rows = "".join(
         f"<li>{count:,} {kind.code}: {escape(kind.value)}. "
         f"<code>{escape(show_command('RUN', kind))}</code></li>"
@@ -196,10 +189,7 @@ def attention_list(run: EvaluatedRun) -> str:
 
 
 def find_overview(run: EvaluatedRun) -> Overview:
-    """Return the overview that the run wrote.
-
-    It is made of its models where it wrote none.
-    """
+    """Return the overview that the run wrote, else one of its models."""
     if record := run.record.get("summary"):
         return Overview.from_dict(record)
     return Overview.of(
@@ -266,11 +256,7 @@ def distributions(run: EvaluatedRun) -> str:
 
 
 def worst_indices(run: EvaluatedRun) -> list[int]:
-    """Return the indices of the twenty worst models.
-
-    Poor ones come first, then those that explain the least of their points (of equals the larger
-    RMSE first).
-    """
+    """Return the indices of the twenty worst models: poor ones, then those of worst shares."""
     worst_first = [grade.code for grade in reversed(Grade)]
     grades = np.array(
         [
@@ -293,10 +279,7 @@ def choose_buildings(run: EvaluatedRun, worst: list[int], limit: int) -> list[in
 
 
 def worst_buildings(run: EvaluatedRun, worst: list[int], visible: list[int]) -> str:
-    """Return a card for each of the worst buildings.
-
-    A click selects the building by its place among those shown.
-    """
+    """Return a card for each of the worst buildings; a click selects it by its place."""
     place = {index: position for position, index in enumerate(visible)}
     cards = "".join(worst_card(run, index, place[index]) for index in worst)
     return cards or "<p>No points were given, so there are no residuals.</p>"

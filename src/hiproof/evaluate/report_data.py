@@ -32,10 +32,7 @@ MOST_REPORT_POINTS = 600_000  # points in the page, 7 MB: what a browser still o
 
 
 def report_data(run: EvaluatedRun, outlines: Sequence[shapely.Geometry | None]) -> dict[str, Any]:
-    """Return the page's data, ready for JSON.
-
-    `outlines` are plan polygons (world), None where nothing is known of the place.
-    """
+    """Return the page's data for JSON; `outlines` are world polygons, None if unknown."""
     origin = scene_origin(run, outlines)
     buildings = [building_data(run, i, outlines[i], origin) for i in range(len(run.models))]
     types = sorted(
@@ -52,10 +49,7 @@ def report_data(run: EvaluatedRun, outlines: Sequence[shapely.Geometry | None]) 
 
 
 def scene_origin(run: EvaluatedRun, outlines: Sequence[shapely.Geometry | None]) -> np.ndarray:
-    """Return a whole-metre corner (3,) below everything.
-
-    With it, float32 keeps millimetres over a city.
-    """
+    """Return a whole-metre corner (3,) below everything, so that float32 keeps millimetres."""
     corners = [model.solid.vertices.min(axis=0) for model in run.models if model.solid is not None]
     corners += [
         np.array([*outline.bounds[:2], np.inf]) for outline in outlines if outline is not None
@@ -67,10 +61,7 @@ def scene_origin(run: EvaluatedRun, outlines: Sequence[shapely.Geometry | None])
 def building_data(
     run: EvaluatedRun, index: int, outline: shapely.Geometry | None, origin: np.ndarray
 ) -> dict[str, Any]:
-    """Return what the map and the panel show of one building.
-
-    The residual is from the points given, else as the model has it.
-    """
+    """Return what the page shows of a building, residuals by points, else the model's own."""
     model, figures, is_update = run.models[index], run.figures[index], "update" in run.record
     status = Status.__members__.get(model.status.upper())
     residual: Any = figures.quality.psd_mean
@@ -106,10 +97,7 @@ def mean_sun(model: BuildingModel) -> float | None:
 
 
 def finite(value: Any) -> Any:
-    """Convert `value` to one that JSON can hold.
-
-    Numbers are rounded, NaN becomes None, and anything else text.
-    """
+    """Convert `value` to one of JSON: a rounded number, None for NaN, else text."""
     if isinstance(value, (bool, str, int)) or value is None:
         return value
     if isinstance(value, (float, np.floating)):
@@ -118,10 +106,7 @@ def finite(value: Any) -> Any:
 
 
 def outline_rings(outline: shapely.Geometry | None, origin: np.ndarray) -> list[list[float]]:
-    """Return the rings of a polygon or multipolygon as flat x, y lists.
-
-    They are about the origin, to the centimetre.
-    """
+    """Return rings of (multi)polygons as flat x, y lists about the origin, to the centimetre."""
     if outline is None:
         return []
     rings = [
@@ -185,10 +170,7 @@ def roof_places(model: BuildingModel, part: np.ndarray, types: list[str]) -> lis
 
 
 def point_data(run: EvaluatedRun, origin: np.ndarray) -> dict[str, str]:
-    """Return points (n, 3) with their distances to the roof in metres (n,).
-
-    They are every k-th point of each building.
-    """
+    """Return every k-th point (n, 3) of each building with its distance to the roof (n,)."""
     largest = max(1, min(POINTS_PER_BUILDING, MOST_REPORT_POINTS // max(len(run.models), 1)))
     places, distances = [np.empty((0, 3))], [np.empty(0)]
     for model, points in zip(run.models, run.points, strict=True):
@@ -205,10 +187,7 @@ def point_data(run: EvaluatedRun, origin: np.ndarray) -> dict[str, str]:
 
 
 def places_on_map(run: EvaluatedRun) -> list[shapely.Geometry | None]:
-    """Return the plan outline of every model.
-
-    It is the footprint of a building without a model, None where it has neither.
-    """
+    """Return every model's plan outline, its footprint without a solid, None without either."""
     footprints = run.footprints or (None,) * len(run.models)
     return [
         plan_outline(model.solid) if model.solid is not None else footprint

@@ -25,10 +25,7 @@ def residual_bins(distances: np.ndarray) -> np.ndarray:
 
 
 def histogram(values: np.ndarray, title: str, unit: str, bins: int = 30) -> str:
-    """Draw a histogram of the finite `values`.
-
-    The last bar holds all above the 98th percentile.
-    """
+    """Draw a histogram of the finite `values`, all above the 98th percentile in one bar."""
     values = np.asarray(values, float)
     values = values[np.isfinite(values)]
     heading = f"{title} ({unit})" if unit else title
@@ -104,10 +101,7 @@ def building_pictures(
 
 
 def slope_direction(solid: Solid) -> np.ndarray:
-    """Return the level unit vector (3,) in which the largest slope falls.
-
-    It is east where all roof faces are level.
-    """
+    """Return the level unit vector (3,) in which the largest slope falls, east if level."""
     normals = np.array(
         [ring_normal(solid.vertices[list(face.rings[0])]) for face in solid.select_faces(ROOF)]
     )

@@ -156,10 +156,7 @@ def evaluate_run(
 
 
 def run_record(folder: Path) -> dict[str, Any]:
-    """Read run.json, empty where the folder has none.
-
-    Raises InputError where it is no record of a run.
-    """
+    """Read run.json, empty without one; raises InputError where it is no record of a run."""
     path = Path(folder) / "run.json"
     record = parse_object(read_text(path), f"the record of a run, {path}") if path.is_file() else {}
     try:
@@ -218,11 +215,7 @@ def collect_points(
     models: Sequence[BuildingModel],
     areas: Sequence[Any],
 ) -> list[np.ndarray]:
-    """Return the points (n, 3) of each model, as its run saw them.
-
-    The shifts of surveys are taken off, and a model that names its surveys gets the points of
-    these alone.
-    """
+    """Return points (n, 3) of each model, of the surveys it names, their shifts taken off."""
     result = [[np.empty((0, 3))] for _ in models]
     for survey in surveys:
         xyz = building_points(survey.clouds, record, areas) - survey.shift
@@ -237,10 +230,7 @@ def collect_points(
 def building_points(
     clouds: Sequence[str], record: dict[str, Any], areas: Sequence[Any]
 ) -> np.ndarray:
-    """Return points (n, 3) of the building classes around `areas`.
-
-    Of clouds without classes they are all points.
-    """
+    """Return points (n, 3) around `areas`: of building classes, or all without classes."""
     from ..read.points.pointcloud import expand_paths, read_points, refuse_other_crs
 
     settings = run_settings(record)
@@ -263,10 +253,7 @@ def match_footprints(
     record: dict[str, Any],
     options: dict[str, Any],
 ) -> list[Any]:
-    """Return the footprint polygon of each model, None without one.
-
-    `options` is what else `read_footprints` is told.
-    """
+    """Return the footprint of each model, or None; `options` go to `read_footprints`."""
     if path is None:
         return [None] * len(models)
     from ..read.outlines.footprints import read_footprints
@@ -285,29 +272,20 @@ def run_units(record: dict[str, Any]) -> Units:
 
 
 def way_to_models(record: dict[str, Any]) -> Units | None:
-    """Return the units that lead from a run's world metres to its models.
-
-    It is None where the models are in the CRS of the clouds.
-    """
+    """Return the units that lead from a run's metres to its models, None for the same CRS."""
     out_crs = run_out_crs(record)
     return FileUnits.of(run_crs(record), run_units(record), out_crs).cityjson if out_crs else None
 
 
 def run_out_crs(record: dict[str, Any]) -> str:
-    """Return the CRS in which the run wrote coordinates.
-
-    It is empty where that is the CRS of its clouds.
-    """
+    """Return the CRS in which the run wrote, empty where it is that of its clouds."""
     return ((record.get("settings") or {}).get("write") or {}).get("out_crs") or ""
 
 
 def match_references(
     models: Sequence[BuildingModel], path: str | None
 ) -> list[BuildingModel | None]:
-    """Return the reference building that stands for each model.
-
-    Logs one line where none does for any.
-    """
+    """Return the reference building of each model; logs one line where there is none."""
     if path is None:
         return [None] * len(models)
     neighbours = [

@@ -76,10 +76,7 @@ POOR_UNSUPPORTED = 0.3
 
 
 class Cluster(NamedTuple):
-    """Points that lie off the roof together.
-
-    It has their number, the distance of the farthest, and the area that they stand for.
-    """
+    """Points off the roof together: their number, farthest distance and area."""
 
     points: int = 0
     height_m: float = 0.0
@@ -191,10 +188,7 @@ def part_findings(evidence: Evidence) -> list[Finding]:
 
 
 def collect_evidence(model: Model, points: np.ndarray, unused: np.ndarray) -> Evidence:
-    """Collect the evidence of `points` (n, 3) and `unused` ones (m, 3).
-
-    See `judge_model`.
-    """
+    """Collect the evidence of `points` (n, 3) and `unused` ones (m, 3); see `judge_model`."""
     roof = model.roof
     points, unused = (p[find_inside(roof.outline, *p[:, :2].T)] for p in (points, unused))
     everything = np.concatenate([points, unused])
@@ -239,10 +233,7 @@ def wall_rings(model: Model) -> list[list[np.ndarray]]:
 
 
 def is_tilted(points: np.ndarray, dz: np.ndarray) -> bool:
-    """Return whether points (n, 3) on a part rise another way than it.
-
-    `dz` (n,) is how far they lie above it.
-    """
+    """Return whether points (n, 3), `dz` (n,) above a part, rise another way than it."""
     if len(points) < FEWEST_TILTED:
         return False
     design = np.column_stack([points[:, :2] - points[:, :2].mean(axis=0), np.ones(len(points))])
@@ -274,10 +265,7 @@ def largest_cluster(
 
 
 def clusters_in_plan(points: np.ndarray, cell_m: float) -> list[np.ndarray]:
-    """Return indices of points (n, 3), in groups whose plan cells touch.
-
-    Cells also touch at corners.
-    """
+    """Return indices of points (n, 3), in groups whose plan cells touch, also at corners."""
     cells, number = number_cells(np.floor(points[:, :2] / cell_m))
     touching = cKDTree(cells).query_pairs(1.5, output_type="ndarray")
     label = label_components(len(cells), touching.T)[number]

@@ -21,10 +21,7 @@ bays fill up.
 
 
 def default_radius(xy: np.ndarray) -> float:
-    """Return the radius (m) for points `xy` (n, 2): 2.5 mean spacings.
-
-    The mean spacing is that of the points spread evenly over their convex hull.
-    """
+    """Return 2.5 mean spacings (m) of points `xy` (n, 2) if spread over their convex hull."""
     # one line through all: many points would be as many geometries
     hull_area = shapely.convex_hull(shapely.linestrings(xy)).area if len(xy) > 2 else 0.0
     return SPACINGS * float(np.sqrt(hull_area / max(len(xy), 1)))

@@ -78,10 +78,7 @@ def measure_range(values):
 
 @compiled
 def compute_median(values):
-    """Return the median of `values` (n,), float64, of which there is one at least.
-
-    They are sorted no further than it takes (Hoare's selection).
-    """
+    """Return the median of `values` (n,), n > 0, sorted no further than it takes (Hoare)."""
     x, half, low, high = values.copy(), len(values) // 2, 0, len(values) - 1
     while low < high:
         pivot, i, j = x[half], low, high

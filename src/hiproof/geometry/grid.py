@@ -43,10 +43,7 @@ def count_cells(cells: np.ndarray) -> int:
 
 
 def cell_range(xy: np.ndarray, cell_m: float) -> tuple[tuple[int, int], tuple[int, int]]:
-    """Return the first cell of the world's grid, and the numbers of cells.
-
-    Both are (column, row). The cells hold `xy` (n, 2 or more), n > 0.
-    """
+    """Return the first (column, row) of the grid's cells that hold `xy` (n, 2), and counts."""
     lower = [math.floor(xy[:, axis].min() / cell_m) for axis in (0, 1)]
     upper = [math.floor(xy[:, axis].max() / cell_m) for axis in (0, 1)]
     return (lower[0], lower[1]), (upper[0] - lower[0] + 1, upper[1] - lower[1] + 1)

@@ -116,10 +116,7 @@ def make_strips(edges: OutlineEdges, widths: np.ndarray, side: float = 1.0) -> n
 
 
 def find_mitre(normals: np.ndarray, widths: np.ndarray) -> np.ndarray | None:
-    """Return the crossing (2,) of two lines, None where it is far away.
-
-    They lie in the directions of `normals` (2, 2) in distances `widths` (2,) from the origin.
-    """
+    """Return where lines at `widths` (2,) along `normals` (2, 2) cross, None if far away."""
     if abs(normals[0, 0] * normals[1, 1] - normals[0, 1] * normals[1, 0]) < PARALLEL:
         return None
     mitre = np.linalg.solve(normals, widths)

@@ -54,10 +54,7 @@ class PointGrid:
         return cell_m * x, cell_m * y, cell_m * (x + self.columns), cell_m * (y + self.rows)
 
     def candidates(self, bounds: Sequence[float] | np.ndarray) -> np.ndarray:
-        """Return the indices of the points in all cells that a box meets.
-
-        `bounds` is (xmin, ymin, xmax, ymax).
-        """
+        """Return indices of points in all cells that a box (xmin, ymin, xmax, ymax) meets."""
         first = self.cell_range(bounds[0], bounds[2], 0)
         last = self.cell_range(bounds[1], bounds[3], 1)
         rows = np.arange(max(last[0], 0), min(last[1], self.rows - 1) + 1)
@@ -86,10 +83,7 @@ class PointGrid:
         return np.sort(result[find_inside(polygon, x, y)])
 
     def find_within(self, polygon: shapely.Polygon, distance_m: float) -> np.ndarray:
-        """Return ascending indices of the points at most `distance_m` from `polygon`.
-
-        Points inside the polygon are among them.
-        """
+        """Return ascending indices of points inside, or at most `distance_m` from, `polygon`."""
         if polygon.is_empty:
             return np.empty(0, np.int64)
         return self.inside(

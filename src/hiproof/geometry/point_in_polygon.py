@@ -46,10 +46,7 @@ def find_inside(area: shapely.Geometry, x: np.ndarray, y: np.ndarray) -> np.ndar
 
 @compiled
 def mark_inside(x, y, starts, ends):
-    """Return which places x, y (n,) lie inside rings or on their border.
-
-    The edges go from `starts` to `ends` (m, 2).
-    """
+    """Return which x, y (n,) lie inside or on rings of edges `starts` to `ends` (m, 2)."""
     inside, is_on = np.zeros(len(x), np.bool_), np.zeros(len(x), np.bool_)
     for e in range(len(starts)):
         x0, y0, x1, y1 = starts[e, 0], starts[e, 1], ends[e, 0], ends[e, 1]

@@ -95,10 +95,7 @@ def list_between(
 
 
 def ring_normal(ring: np.ndarray) -> np.ndarray:
-    """Return the vector area (3,) of a closed ring (m, 3), by Newell's method.
-
-    The first vertex is not repeated at the end.
-    """
+    """Return the vector area (3,) of a ring (m, 3), first vertex once, by Newell's method."""
     return ring_normals([ring])[0]
 
 

@@ -55,10 +55,7 @@ def without_repeats(xyz: np.ndarray) -> np.ndarray:
 
 
 def hashes(xyz: np.ndarray) -> np.ndarray:
-    """Return a 64-bit hash (n,) of each point's coordinates.
-
-    It mixes bits as splitmix64 does (Steele et al. 2014).
-    """
+    """Return points' hashes (n,) of 64 bits, mixed as by splitmix64 (Steele et al. 2014)."""
     bits = np.ascontiguousarray(np.asarray(xyz, float)[:, :3]).view(np.uint64)
     mixed = np.zeros(len(bits), np.uint64)
     for column in bits.T:
@@ -74,10 +71,7 @@ def hashes(xyz: np.ndarray) -> np.ndarray:
 def rank_in_cells(
     xyz: np.ndarray, cell_m: float, rank: Callable[[np.ndarray], np.ndarray]
 ) -> np.ndarray:
-    """Return one point a cell, its height that of `rank(counts)`.
-
-    The rank is among the cell's heights in ascending order.
-    """
+    """Return one point a cell, of the height `rank(counts)` among its ascending heights."""
     if not len(xyz):
         return np.empty((0, 3))
     xyz, cell_m = np.ascontiguousarray(xyz, float), float(cell_m)

@@ -21,10 +21,7 @@ __all__ = ["TrainSettings", "train"]
 
 
 def __getattr__(name: str):
-    """Import `train` and `TrainSettings` when they are used.
-
-    Raises InputError where what training takes is missing.
-    """
+    """Import `train` and `TrainSettings` on use; raises InputError without what they need."""
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     for package in ("torch", "onnx", "matplotlib"):

@@ -38,10 +38,7 @@ FIRST_SOURCE_SHARE = 0.7
 
 @dataclass(frozen=True)
 class Simulated:
-    """Buildings simulated without end, some with annexes.
-
-    The scanner has all its defects.
-    """
+    """Buildings simulated without end, some with annexes, the scanner with all defects."""
 
     types: tuple[str, ...]
     seed: int
@@ -134,10 +131,7 @@ def usable(cloud: Scan) -> bool:
 
 
 def as_sample(cloud: Scan, types: tuple[str, ...], type: int, rng: np.random.Generator) -> Sample:
-    """Return a scan with labels in `types`, thinned.
-
-    It keeps the most points that a training cloud may have.
-    """
+    """Return a scan with labels in `types`, thinned to the most points of a training cloud."""
     if len(cloud) > POINTS[1]:
         cloud = cloud.select(np.sort(rng.choice(len(cloud), POINTS[1], replace=False)))
     index = np.full(len(CATALOGUE) + 1, NOT_ROOF)  # the last for what is no roof
@@ -207,10 +201,7 @@ SMALLEST_AREA_M2 = 12.0  # m2 of ground; smaller are sheds, whose type is often 
 
 @dataclass(frozen=True)
 class Shape:
-    """One solid in world coordinates with its roof type.
-
-    It has a plan `outline`, and tells whether training may see it.
-    """
+    """A solid in the world: its roof type, plan `outline`, and whether training may see it."""
 
     id: str
     type: str

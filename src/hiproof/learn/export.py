@@ -111,10 +111,7 @@ def write_card(
     best_epoch: int,
     made_by: dict,
 ) -> None:
-    """Write `model_card.json` and `model_card.md`.
-
-    They have data, settings, figures of the best epoch, and what trained it.
-    """
+    """Write `model_card.json` and `.md`: data, settings, figures of the best epoch, maker."""
     best = next(record for record in history if record["epoch"] == best_epoch)
     card = {
         "hiproof": __version__,

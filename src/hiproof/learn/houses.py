@@ -62,10 +62,7 @@ def with_short_ridge(rng: np.random.Generator, hip: Part) -> Part:
 
 
 def lengthen(rng: np.random.Generator, part: Part) -> Part:
-    """Make a part as long as a row or a barn.
-
-    It becomes half a width to three widths longer.
-    """
+    """Make a part as long as a row or a barn, by half a width to three widths."""
     additions = part.parameters["width"] * rng.uniform(0.5, 3.0)
     parameters = {
         name: value + additions * (name in LENGTHS) for name, value in part.parameters.items()
@@ -74,10 +71,7 @@ def lengthen(rng: np.random.Generator, part: Part) -> Part:
 
 
 def resize(rng: np.random.Generator, part: Part) -> Part:
-    """Shrink a part down to two fifths of its size, and lower it.
-
-    It is a shed or a garage then, and lower than that by up to a half.
-    """
+    """Shrink a part to a shed or garage, down to two fifths, and lower it by up to a half."""
     size = rng.uniform(0.4, 1.0)
     lower = size * rng.uniform(0.5, 1.0)
     factors = dict.fromkeys(HEIGHTS, lower) | dict.fromkeys(COUNTS, 1.0)
@@ -107,10 +101,7 @@ def without_a_corner(rng: np.random.Generator, part: Part) -> Part:
 
 
 def hip_one_end(rng: np.random.Generator, gable: Part) -> Part:
-    """Return a roof with a hip at one end and a gable wall at the other.
-
-    It is called a gable: RoofN3D's hips are "two-sided", and the catalogue has nothing nearer.
-    """
+    """Return a hip at one end, a gable at the other: a gable, as RoofN3D's hips have two."""
     hip = make_part("hip", random_parameters(rng, "hip"), gable.kappa, gable.translation)
     piece = hip.pieces[0]
     rise_along_ridge = piece.planes[:, :2] @ (math.cos(hip.kappa), math.sin(hip.kappa))
@@ -119,10 +110,7 @@ def hip_one_end(rng: np.random.Generator, gable: Part) -> Part:
 
 
 def annex(rng: np.random.Generator, main: Part) -> Part:
-    """Place one part against a random side of `main`.
-
-    It lies under its eave, or level with it and reaching under its roof.
-    """
+    """Place a part against a side of `main`, under its eave, or level and under its roof."""
     length, width = main.parameters["length"], main.parameters["width"]
     quarters = int(rng.integers(4))
     reach, side = (length / 2, width) if quarters % 2 == 0 else (width / 2, length)
@@ -153,10 +141,7 @@ def annex(rng: np.random.Generator, main: Part) -> Part:
 def annex_parameters(
     rng: np.random.Generator, type: str, length: float, width: float, limit: float
 ) -> dict[str, float]:
-    """Return theta_p of an annex `length` (outwards) by `width`.
-
-    A gable or hip is no higher than `limit` unless that is low.
-    """
+    """Return theta_p of an annex, `length` outwards, no higher than `limit` unless low."""
     slope = math.tan(math.radians(rng.uniform(15.0, 45.0)))
     parameters = {"length": length, "width": width}
     if type in ("gable", "hip"):

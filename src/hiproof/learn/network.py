@@ -26,11 +26,7 @@ from ..segment.sampling import POINT_FEATURES, POSITION_SCALE
 
 @dataclass(frozen=True)
 class NetworkSettings:
-    """Widths of the network.
-
-    `widths` are those of the four set abstractions as (first layer, output) pairs, and those of the
-    heads.
-    """
+    """Widths of the network: (first layer, output) of four set abstractions, and heads."""
 
     types: tuple[str, ...] = ()
     layout: Layout = field(default_factory=Layout)
@@ -70,10 +66,7 @@ class SetAbstraction(nn.Module):
         self.norm = nn.BatchNorm1d(outputs)
 
     def forward(self, x, position, centres, group):
-        """Return the centres' features (S, outputs).
-
-        Inputs are features (rows, C) and positions over the radius (rows, 3).
-        """
+        """Return features (S, outputs) of (rows, C) and positions over the radius (rows, 3)."""
         source = self.features(x) + self.position(position)
         grouped = torch.relu(gather_rows(source, group) - self.position(centres).unsqueeze(1))
         return torch.relu(self.norm(self.second(grouped).max(dim=1)[0]))
@@ -120,10 +113,7 @@ class GlobalAbstraction(nn.Module):
 
 
 class RoofNetwork(nn.Module):
-    """Logits of every point and of the building's type, from arranged clouds.
-
-    A point's logits are those of the types, then of not-roof.
-    """
+    """Logits of every point (types, then not-roof) and of the type, by arranged clouds."""
 
     def __init__(self, settings: NetworkSettings):
         super().__init__()
@@ -178,10 +168,7 @@ def gather_rows(x, index):
 
 
 def network_inputs(arrangements: list[Arrangement], layout: Layout) -> tuple[torch.Tensor, ...]:
-    """Return the network's nine inputs for a batch of buildings.
-
-    They are in the order of `segment.inference.INPUT_NAMES`.
-    """
+    """Return the nine inputs of a batch of buildings in the order of INPUT_NAMES."""
     return tuple(
         torch.from_numpy(array) for array in stack_arrangements(arrangements, layout).values()
     )

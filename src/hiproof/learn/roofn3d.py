@@ -46,10 +46,7 @@ class RoofN3D:
 
     @classmethod
     def open(cls, folder: Path, types: tuple[str, ...] = (), seed: int = 1) -> RoofN3D:
-        """Read both csv files of `folder`.
-
-        Raises InputError when they are missing, of another layout or too few.
-        """
+        """Read both csv files of `folder`; InputError where missing, too few, or otherwise laid."""
         for name in (BUILDINGS_FILE, SURFACES_FILE):
             if not (folder / name).is_file():
                 raise InputError(

@@ -15,11 +15,7 @@ TRAINING, VALIDATION, TEST = 1, 2, 3  # roles; their numbers seed what is drawn 
 
 @dataclass(frozen=True)
 class Sample:
-    """One labelled cloud.
-
-    `xyz` (n, 3) are metres, `labels` (n,) the index of the roof type or -1 for not-roof, and `type`
-    an index.
-    """
+    """A cloud `xyz` (n, 3) (m), `labels` (n,) of roof types or -1, and its `type`."""
 
     xyz: np.ndarray
     labels: np.ndarray
@@ -27,10 +23,7 @@ class Sample:
 
 
 class Source(Protocol):
-    """A supply of labelled clouds, the same whenever asked for.
-
-    A cloud has a role (TRAINING, VALIDATION, TEST) and a number.
-    """
+    """A supply of labelled clouds, the same for a role (TRAINING, ...) and a number."""
 
     @property
     def types(self) -> tuple[str, ...]: ...
@@ -50,10 +43,7 @@ first axis.
 
 @dataclass(frozen=True)
 class AugmentSettings:
-    """Bounds of the random changes.
-
-    `scale` is relative, `jitter_m` the largest standard deviation, `drop` a share.
-    """
+    """Bounds of random changes: relative `scale`, largest sigma `jitter_m`, share `drop`."""
 
     scale: float = 0.12
     stretch: float = 0.08
@@ -74,10 +64,7 @@ def vary_cloud(
 
 
 def symmetric(features: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Mirror arranged features (N, 11) along and across the building.
-
-    Each happens every second time.
-    """
+    """Mirror arranged features (N, 11) along and across the building, each by chance 1/2."""
     features = features.copy()
     for columns in (ALONG_AXES, ACROSS_AXES):
         if rng.random() < 0.5:

@@ -99,10 +99,7 @@ def train(
 
 
 class Trainer:
-    """One training run.
-
-    It has the network, its running average, optimiser, history, and the place of its files.
-    """
+    """A training run: network, running average, optimiser, history, and its files' place."""
 
     def __init__(
         self,
@@ -181,10 +178,7 @@ class Trainer:
                 yield [turn_cloud(clouds[i], rng) for i in order[index : index + settings.batch]]
 
     def training_cloud(self, index: int):
-        """Return the arranged cloud number `index`, with labels and type.
-
-        It is varied at random by that number.
-        """
+        """Return the arranged cloud of that number, varied at random by it, labels and type."""
         rng = np.random.default_rng([self.settings.seed, 7, index])
         sample = self.source.sample(TRAINING, index)
         xyz, labels = vary_cloud(sample.xyz, sample.labels, rng, self.settings.augment)
@@ -205,10 +199,7 @@ class Trainer:
         return float(loss.detach())
 
     def tensors(self, clouds):
-        """Return network inputs, point labels and types of a batch, on the device.
-
-        Not-roof is the last label.
-        """
+        """Return network inputs, labels (not-roof the last) and types of a batch, on the device."""
         inputs = network_inputs([cloud[0] for cloud in clouds], self.settings.layout)
         all_labels = np.concatenate([cloud[1] for cloud in clouds])
         labels = torch.from_numpy(
@@ -234,10 +225,7 @@ class Trainer:
 
     @torch.no_grad()
     def update_average(self, steps: int):
-        """Update the exponential running average of weights and statistics.
-
-        Its memory is short in the first of all `steps`.
-        """
+        """Update the running average of weights and statistics, short in the first `steps`."""
         keep = min(self.settings.average, (1 + steps) / (10 + steps))
         state = self.network.state_dict()
         for name, value in self.averaged.state_dict().items():
@@ -287,10 +275,7 @@ class Trainer:
         os.replace(partial, self.folder / "checkpoint.pt")
 
     def resume(self):
-        """Resume from the folder's checkpoint if there is one.
-
-        Raises InputError if it is of another network.
-        """
+        """Resume from the folder's checkpoint, if any; InputError for one of another network."""
         path = self.folder / "checkpoint.pt"
         if not path.exists():
             return
@@ -346,19 +331,13 @@ def turn_cloud(cloud, rng: np.random.Generator):
 
 
 def arrange_sample(sample: Sample, layout: Layout):
-    """Arrange a validation cloud, unchanged.
-
-    Returns (arrangement, labels of its chosen points, type).
-    """
+    """Return a validation cloud (arrangement, labels of its chosen points, type), unchanged."""
     arrangement = arrange(sample.xyz, layout)
     return arrangement, sample.labels[arrangement.select], sample.type
 
 
 def chosen_device(name: str) -> torch.device:
-    """Return the requested device.
-
-    "auto" takes a GPU where there is one. Raises SettingsError when it is absent.
-    """
+    """Return the device, "auto" a GPU if there is one; SettingsError when it is absent."""
     available = torch.cuda.is_available()
     if name == "cuda" and not available:
         raise SettingsError(

@@ -23,10 +23,7 @@ from .solid import Solid
 
 @dataclass(frozen=True)
 class Passage:
-    """A passage under a building, open below its `ceiling` over its `outline`.
-
-    Both are in the roof's frame, in metres.
-    """
+    """A passage below its `ceiling` over its `outline`, both in the roof's frame (m)."""
 
     outline: shapely.Polygon
     ceiling: float
@@ -53,10 +50,7 @@ ONE_LEVEL = Underside()
 
 @dataclass(frozen=True)
 class Quality:
-    """How well a model fits its points, in metres unless named otherwise.
-
-    A measure that cannot be computed is NaN.
-    """
+    """How well a model fits its points (m unless named), NaN where it cannot be computed."""
 
     points: int = 0
     density: float = float("nan")
@@ -112,10 +106,7 @@ class Model:
 
     @property
     def main(self) -> int:
-        """Index of the main part: the one that shows the largest area.
-
-        Its type is the building's.
-        """
+        """Index of the main part, which shows the largest area and gives the building its type."""
         return self.visible_m2.index(max(self.visible_m2))
 
 

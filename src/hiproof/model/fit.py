@@ -40,10 +40,7 @@ class Fit:
     faces: tuple[tuple[int, ...], ...]
 
     def height_at(self, xy: np.ndarray) -> np.ndarray:
-        """Return the roof height (n,) at `xy` (n, 2), in the frame of the points.
-
-        It is NaN outside the outline.
-        """
+        """Return the roof height (n,) at `xy` (n, 2) in the points' frame, NaN outside."""
         frame = LocalFrame(self.global_translation)
         roof = Roof((self.part,), self.part.pieces[0].outline, frame)
         return roof.height_at(frame.to_local(np.asarray(xy, float))) + self.global_translation[2]

@@ -18,19 +18,13 @@ from ..frames import LocalFrame
 
 @dataclass(frozen=True)
 class Piece:
-    """The lower envelope of `planes` (k, 3) over an `outline`.
-
-    A plane is z = a x + b y + c, in the outline's frame.
-    """
+    """The lower envelope of `planes` (k, 3), z = a x + b y + c, over an `outline`."""
 
     outline: shapely.Polygon
     planes: np.ndarray
 
     def height_at(self, xy: np.ndarray) -> np.ndarray:
-        """Return the height (n,) of the lower envelope at `xy` (n, 2).
-
-        The outline is not taken into account.
-        """
+        """Return the height (n,) of the lower envelope at `xy` (n, 2), whatever the outline."""
         return (np.asarray(xy, float) @ self.planes[:, :2].T + self.planes[:, 2]).min(axis=1)
 
     def move(self, shift: np.ndarray) -> Piece:
@@ -68,10 +62,7 @@ class Part:
         return list(dict.fromkeys(piece.outline for piece in self.pieces))
 
     def height_at(self, xy_local: np.ndarray) -> np.ndarray:
-        """Return the height (n,) at `xy_local` (n, 2) in the roof's frame.
-
-        It is minus infinity beside the part, since a roof is the max of its parts.
-        """
+        """Return the height (n,) at `xy_local` (n, 2) in the roof's frame, -inf beside the part."""
         z = np.full(len(xy_local), -np.inf)
         for piece in self.pieces:
             inside = shapely.intersects_xy(piece.outline, xy_local[:, 0], xy_local[:, 1])
@@ -82,10 +73,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Roof:
-    """All parts of one building's roof, in the local `frame`, over `outline`.
-
-    `outline` is in plan and may have holes.
-    """
+    """All parts of one building's roof in the local `frame`, over `outline` (may have holes)."""
 
     parts: tuple[Part, ...]
     outline: shapely.Polygon
@@ -101,10 +89,7 @@ class Roof:
         return tuple(piece for part in self.parts for piece in part.pieces)
 
     def height_at(self, xy_local: np.ndarray) -> np.ndarray:
-        """Return the roof height (n,) at `xy_local` (n, 2) in the local frame.
-
-        It is NaN where no piece covers the place.
-        """
+        """Return the roof height (n,) at `xy_local` (n, 2), NaN where no piece covers it."""
         xy_local = np.asarray(xy_local, float)
         z = np.max([part.height_at(xy_local) for part in self.parts], axis=0)
         return np.where(np.isfinite(z), z, np.nan)

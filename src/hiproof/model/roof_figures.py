@@ -66,10 +66,7 @@ class RoofFigures:
 
 
 def find_ground_height(building: Building, figures: RoofFigures | None) -> float:
-    """Return the height of the building's ground.
-
-    It is that of reconstruction, else the base of its solid, else NaN.
-    """
+    """Return the ground's height of reconstruction, else the solid's base, else NaN."""
     if math.isfinite(building.z_ground) or figures is None:
         return building.z_ground
     return figures.h_base
@@ -137,10 +134,7 @@ def roof_heights(z: np.ndarray, plan: np.ndarray, z_origin: float) -> dict[str, 
 
 
 def cut_roof(solid: Solid, shell: FlatShell) -> tuple[np.ndarray, np.ndarray]:
-    """Cut the roof into fan triangles.
-
-    Returns the numbers (t, 3) of their corners in the shell, and their signed areas in plan (t,).
-    """
+    """Return the roof's fan triangles: corners (t, 3) in the shell, signed plan areas (t,)."""
     anchors = shell.ring_start[shell.face_start[shell.face_of]]
     fan = np.stack([anchors, np.arange(len(anchors)), shell.after], axis=1)
     is_roof = np.array([face.kind == ROOF for face in solid.faces])
@@ -149,10 +143,7 @@ def cut_roof(solid: Solid, shell: FlatShell) -> tuple[np.ndarray, np.ndarray]:
 
 
 def slopes_and_azimuths(area: np.ndarray, is_roof: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return slope and azimuth in degrees (faces,) of vector areas (faces, 3).
-
-    NaN where no roof or, for azimuths, level.
-    """
+    """Return slope and azimuth (degrees) of areas (faces, 3), NaN if no roof, or level."""
     x, y, z = area.T
     slope = np.where(is_roof, np.degrees(np.arctan2(np.hypot(x, y), z)), np.nan)
     azimuth = np.where(slope >= FLAT_SLOPE_DEG, np.degrees(np.arctan2(x, y)) % 360.0, np.nan)
@@ -160,10 +151,7 @@ def slopes_and_azimuths(area: np.ndarray, is_roof: np.ndarray) -> tuple[np.ndarr
 
 
 def find_base_height(solid: Solid) -> float:
-    """Return the lowest height of the ground surface.
-
-    It is that of the whole solid where none is marked.
-    """
+    """Return the lowest height of the ground surface, of the solid where none is marked."""
     ground = [index for face in solid.select_faces(GROUND) for ring in face.rings for index in ring]
     return float(solid.vertices[ground or slice(None), 2].min())
 
@@ -240,10 +228,7 @@ def find_eave_height(edges: RoofEdges) -> float:
 
 
 def measure_area_below(level: float, z: np.ndarray, plan: np.ndarray) -> float:
-    """Return the plan area of triangles at or below `level`.
-
-    They have sorted heights `z` (t, 3) and signed plan areas `plan` (t,).
-    """
+    """Return the plan area at or below `level` of triangles, `z` (t, 3), `plan` (t,)."""
     low, middle, high = z.T
     lower, upper = np.maximum(middle - low, 1e-12), np.maximum(high - middle, 1e-12)
     rising = np.clip(level - low, 0.0, lower) ** 2 / lower

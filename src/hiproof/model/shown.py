@@ -30,27 +30,18 @@ SURFACE_SLIVER_M2 = 0.05
 def unite_visible_pieces(
     roof: Roof, visible: Sequence[Sequence[shapely.Geometry]]
 ) -> list[shapely.Geometry]:
-    """Return the visible area of each part, in world coordinates.
-
-    The area of a hidden part is empty.
-    """
+    """Return each part's visible area in world coordinates, empty for a hidden part."""
     united = [with_area(shapely.union_all(pieces, grid_size=GRID_M)) for pieces in visible]
     return shapely.transform(np.array(united, object), roof.frame.to_world).tolist()
 
 
 def measure_visible_pieces(visible: Sequence[Sequence[shapely.Geometry]]) -> tuple[float, ...]:
-    """Return the visible plan area (m2) of each part, rounded.
-
-    Rounding makes the areas of equal parts equal.
-    """
+    """Return each part's visible plan area (m2), rounded so that equal parts' are equal."""
     return tuple(round(float(shapely.area(pieces).sum()), AREA_DIGITS) for pieces in visible)
 
 
 def compute_visible_pieces(roof: Roof, solid: Solid) -> list[list[shapely.Geometry]]:
-    """Return the visible pieces of each part, in the roof's local frame.
-
-    Pieces do not overlap.
-    """
+    """Return each part's visible pieces, which do not overlap, in the roof's local frame."""
     local = solid.move(-roof.frame.origin)
     visible: list[list[shapely.Geometry]] = [[] for _ in roof.parts]
     faces = local.select_faces(ROOF)
@@ -68,10 +59,7 @@ def compute_visible_pieces(roof: Roof, solid: Solid) -> list[list[shapely.Geomet
 
 
 def list_planes(roof: Roof) -> np.ndarray:
-    """Return all planes of a roof (k, 4): the part's number, then a, b and c.
-
-    A plane is z = a x + b y + c.
-    """
+    """Return all planes (k, 4): the part's number, then a, b, c of z = a x + b y + c."""
     parts = enumerate(roof.parts)
     return np.array(
         [
@@ -86,10 +74,7 @@ def list_planes(roof: Roof) -> np.ndarray:
 def parts_in_plane(
     faces: Sequence[Face], vertices: np.ndarray, planes: np.ndarray
 ) -> list[list[int]]:
-    """Return for each face the other parts that have a plane in which it lies.
-
-    The corners of the faces are `vertices` (n, 3).
-    """
+    """Return for each face the other parts with a plane in which its `vertices` lie."""
     if not faces or len(set(planes[:, 0].tolist())) < 2:
         return [[] for _ in faces]
     of_faces = [[vertex for ring in face.rings for vertex in ring] for face in faces]
@@ -123,18 +108,12 @@ def share_surface(
 def without_slivers(
     area: shapely.Geometry, least_m2: float = SURFACE_SLIVER_M2
 ) -> shapely.Geometry:
-    """Return the polygons of an area that are at least `least_m2` large.
-
-    Lines, to which others shrank on the grid, are left out.
-    """
+    """Return polygons of at least `least_m2`, without lines that others shrank to."""
     pieces = shapely.get_parts(area)
     polygons = shapely.get_dimensions(pieces) == 2
     return shapely.multipolygons(pieces[polygons & (shapely.area(pieces) >= least_m2)])
 
 
 def unite_outlines(part: Part) -> shapely.Geometry:
-    """Return the outlines of a part as one area.
-
-    A rounded outline may touch itself. A spike without width has no area.
-    """
+    """Return a part's outlines, which may touch themselves, as one area without spikes."""
     return shapely.union_all(repair_polygons([piece.outline for piece in part.pieces]))

@@ -35,10 +35,7 @@ MOST_SHOWN_VALUES = 3  # values that a sentence shows
 
 
 class NumberColumn(NamedTuple):
-    """A column of numbers, what is expected there, and what reads a value.
-
-    It reads None where a value is unknown.
-    """
+    """A column of numbers, what is expected, and what reads a value, None if unknown."""
 
     name: str
     expected: str

@@ -28,10 +28,7 @@ HIGHEST_BUILDING_M = 1000.0
 
 
 class Implausible(ValueError):
-    """A file's content cannot be true.
-
-    The message is the reason, and the caller adds the file's name.
-    """
+    """A file's content cannot be true, for the reason that is the message."""
 
 
 def is_plausible(xyz: np.ndarray) -> np.ndarray:

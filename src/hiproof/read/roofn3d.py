@@ -98,10 +98,7 @@ def read_roofn3d_labels(
 
 
 def surface_offsets(path: str | Path) -> dict[str, list[int]]:
-    """Return where in the file (bytes) the rows of each building start.
-
-    A row is a line, as no field holds a line break.
-    """
+    """Return where (bytes) each building's rows start: rows are lines without breaks."""
     # refuses another layout before the pass over the whole file
     next(rows(path, ("points", "fk_buildings")), None)
     offsets: dict[str, list[int]] = {}
@@ -118,10 +115,7 @@ def surface_offsets(path: str | Path) -> dict[str, list[int]]:
 
 
 def rows(path: str | Path, required: tuple[str, ...]) -> Iterator[tuple[int, dict[str, str]]]:
-    """Number (the header is 1) and fields by name of each row.
-
-    Raises InputError when a needed column is missing.
-    """
+    """Number rows (the header is 1) with fields by name; InputError without a needed one."""
     csv.field_size_limit(FIELD_LIMIT)
     try:
         with open(path, newline="", encoding="utf-8-sig") as file:
@@ -189,9 +183,6 @@ def polygon(wkt: str) -> shapely.Polygon:
 
 
 def point_keys(points: np.ndarray) -> np.ndarray:
-    """Return one comparable value (n,) for each of the points (n, 3).
-
-    Coordinates count to the millimetre.
-    """
+    """Return a comparable value (n,) for points (n, 3), to the millimetre."""
     units = np.ascontiguousarray(np.rint(points * ROOFN3D_UNITS_PER_M).astype(np.int64))
     return units.view([("", np.int64)] * 3).ravel()

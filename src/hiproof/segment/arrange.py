@@ -17,10 +17,7 @@ from .sampling import arrange_cloud, thin_to_grid
 
 @dataclass(frozen=True)
 class Layout:
-    """Sizes of the network's input.
-
-    They are the `points` kept of a cloud, points of each `levels`, and `neighbours` in a group.
-    """
+    """The network's input: `points` of a cloud, points of `levels`, `neighbours` a group."""
 
     points: int = 256
     levels: tuple[int, int, int] = (128, 64, 16)
@@ -50,10 +47,7 @@ class Arrangement:
 
 
 def arrange(xyz: np.ndarray, layout: Layout) -> Arrangement:
-    """Arrange a building's cloud `xyz` (n, 3) for the network.
-
-    It is in metres in any frame, of n >= 1 finite points.
-    """
+    """Arrange a cloud `xyz` (n, 3), n > 0, finite, in metres of any frame, for the network."""
     thinned = thin_to_grid(xyz, layout.thinned)
     local = np.ascontiguousarray(xyz[thinned] - xyz[thinned].mean(axis=0), dtype=float)
     order, *described = arrange_cloud(local, layout.points, *layout.levels, layout.neighbours)

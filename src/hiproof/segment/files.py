@@ -51,10 +51,7 @@ def segment_files(clouds: list[Path], out: Path, settings: Settings) -> dict[Pat
 def write_points(
     out: Path, labelled: list[tuple[int, Path, np.ndarray, Segmentation]], types, crs, units: Units
 ) -> None:
-    """Write all points in `units` with their extra dimensions.
-
-    Heights and positions are to a thousandth.
-    """
+    """Write points in `units`, to a thousandth, with their extra dimensions."""
     xyz = units.from_metres(np.concatenate([points for _, _, points, _ in labelled]))
     header = laspy.LasHeader(point_format=6, version="1.4")
     header.scales, header.offsets = np.full(3, 0.001), np.floor(xyz.min(axis=0))
@@ -79,10 +76,7 @@ def write_points(
 def write_table(
     path: Path, labelled: list[tuple[int, Path, np.ndarray, Segmentation]], types
 ) -> None:
-    """Write one row a building.
-
-    A row has number, file, points, share of roof points, type, and the probability of every type.
-    """
+    """Write a row a building: number, file, points, roof share, type, all probabilities."""
     try:
         with open(path, "w", newline="", encoding="utf-8") as file:
             table = csv.writer(file)

@@ -87,10 +87,7 @@ class Segmentation:
 
     @property
     def weights(self) -> np.ndarray:
-        """Weight (n,) of each point in a fit.
-
-        It is 0 where the point is surely no roof, else 1; all are 1 where hardly any is left.
-        """
+        """Weight (n,) of each point in a fit: 0 for surely no roof, else 1, and 1 if few remain."""
         mask = self.not_roof < SURELY_NOT_ROOF
         return mask.astype(float) if mask.sum() >= FEWEST_CLOUD_POINTS else np.ones(len(mask))
 
@@ -152,10 +149,7 @@ def run(model: LoadedNetwork, arrangements: list[Arrangement]) -> tuple[np.ndarr
 
 
 def stack_arrangements(arrangements: list[Arrangement], layout: Layout) -> dict[str, np.ndarray]:
-    """Return the graph's inputs by name for B buildings.
-
-    They are flat over buildings, and indices count rows of the level above.
-    """
+    """Return the graph's inputs for B buildings, flat; indices are rows of the level above."""
     sizes = (layout.points, *layout.levels)
 
     def flat(indices, size):
@@ -198,10 +192,7 @@ def carried_back(
 
 
 def checked_points(points: np.ndarray) -> np.ndarray:
-    """Return `points` as float64 (n, 3) in a frame of their own.
-
-    Raises as `segment` does.
-    """
+    """Return `points` as float64 (n, 3) in a frame of their own; raises as `segment`."""
     xyz = np.asarray(points)
     if xyz.ndim != 2 or xyz.shape[1] < 3 or not np.issubdtype(xyz.dtype, np.number):
         raise InputError(
@@ -229,10 +220,7 @@ def checked_points(points: np.ndarray) -> np.ndarray:
 
 @lru_cache(maxsize=4)
 def load(weights: str, device: str = "cpu") -> LoadedNetwork:
-    """Load the network in the ONNX file `weights`, once a process, on one thread.
-
-    Raises as `segment` does.
-    """
+    """Load the network in `weights`, once a process, on one thread; raises as `segment`."""
     onnxruntime = import_onnxruntime()
     if device == "cuda" and "CUDAExecutionProvider" not in onnxruntime.get_available_providers():
         text = ", ".join(onnxruntime.get_available_providers())
@@ -276,10 +264,7 @@ def load(weights: str, device: str = "cpu") -> LoadedNetwork:
 
 
 def import_onnxruntime(alternative: str = "") -> Any:
-    """Import onnxruntime.
-
-    Raises InputError where it is missing, with how to do without it, if that can be.
-    """
+    """Import onnxruntime; InputError without it says how to do without, if that can be."""
     return import_extra("onnxruntime", "network", "recognising roofs", alternative)
 
 

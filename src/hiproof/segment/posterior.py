@@ -86,10 +86,7 @@ def log_prior(types: dict[str, float], names: tuple[str, ...] = ()) -> dict[str,
 
 
 def find_prior(name: str, types: dict[str, float]) -> float:
-    """Return the probability of a type.
-
-    Of one that the network does not know it is that of the nearest, else the mean.
-    """
+    """Return the probability of a type, of the nearest that is known, else the mean."""
     return types.get(find_nearest_type(name, types), 1.0 / max(len(types), 1))
 
 
@@ -116,10 +113,7 @@ def choose_most_probable(
 
 
 def expected_distance(fit: Fit) -> float:
-    """Return the mean distance (m) of a fit's points that the fit expects.
-
-    It follows from its noise and outliers.
-    """
+    """Return the mean distance (m) of points that a fit expects by noise and outliers."""
     on_roof = np.sqrt(2 / np.pi) * fit.noise_m  # mean of the absolute value of a normal
     return (1 - fit.outlier_share) * on_roof + fit.outlier_share * OUTLIER_DISTANCE_M
 

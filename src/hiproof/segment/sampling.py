@@ -61,10 +61,7 @@ def arrange_cloud(xyz, count, level1, level2, level3, group_size):
 
 
 def describe_points(xyz, surface, spacing, count):
-    """Return features (count, 11) of points in the building's own axes.
-
-    There are points (s, 3) and their `surface` (s, 7), repeated to `count`.
-    """
+    """Return features (count, 11) in own axes of points (s, 3) and `surface` (s, 7), repeated."""
     cosine, sine = find_canonical_axes(xyz[:, 0], xyz[:, 1], surface)
     turn = np.array([[cosine, -sine], [sine, cosine]])
     features = np.column_stack(
@@ -126,10 +123,7 @@ def local_surfaces(xyz, order, neighbours=SURFACE_NEIGHBOURS):
 
 
 def find_nearest(sources, places, count, radius=np.inf):
-    """Return distances and indices (p, count) of the nearest `sources` of places (p, 3).
-
-    The distance is infinite where fewer lie within the radius.
-    """
+    """Return distances (inf beyond the radius) and indices (p, count) of `sources` of (p, 3)."""
     bound = np.nextafter(radius, np.inf)
     return KDTree(sources).query(places, np.arange(count) + 1, distance_upper_bound=bound)
 
@@ -157,10 +151,7 @@ def find_canonical_axes(x, y, surface):
 
 
 def find_harmonic(azimuth, weight, width=HARMONIC_WIDTH):
-    """Return the four-fold harmonic of directions (n,), re-weighted twice, and their share near it.
-
-    Directions, harmonic and the `width` within which they count are in radians.
-    """
+    """Return directions' (n,) four-fold harmonic (rad) and their share within `width` of it."""
     kappa, share = 0.0, 0.0
     for turn in range(3):
         aside = azimuth - kappa

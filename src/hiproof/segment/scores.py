@@ -26,10 +26,7 @@ class Scores:
 
     @classmethod
     def of(cls, true: np.ndarray, predicted: np.ndarray, names: tuple[str, ...]) -> Scores:
-        """Score class indices `true` (n,) against `predicted` (n,).
-
-        Both are in 0 .. len(names) - 1.
-        """
+        """Score `true` (n,) against `predicted` (n,), indices 0 .. len(names) - 1."""
         size = len(names)
         counts = np.bincount(np.asarray(true) * size + np.asarray(predicted), minlength=size * size)
         return cls(tuple(names), counts.reshape(size, size))

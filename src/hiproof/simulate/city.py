@@ -110,10 +110,7 @@ class City:
 
 
 def block_buildings(seed: int, i: int, j: int, terrain: Relief) -> list[SimBuilding]:
-    """Return the buildings of block (i, j).
-
-    They are two rows of houses back to back, or one of works.
-    """
+    """Return the buildings of block (i, j): two rows of houses back to back, or one of works."""
     rng = np.random.default_rng([seed, 11, i, j])
     corner = CITY_ORIGIN_XY + turn_points(CITY_BLOCK_M * [[i, j]], HEADING)[0]
     length, depth = CITY_BLOCK_M - STREET_M
@@ -136,10 +133,7 @@ def drawn_names(rng: np.random.Generator, weights: dict[str, float]) -> Iterator
 
 
 class Stock:
-    """The buildings of each block, known by number alone.
-
-    They are drawn again when asked for.
-    """
+    """The buildings of each block by its number alone, drawn again when asked for."""
 
     def __init__(self, city: City):
         self.city, self.terrain = city, city.terrain
@@ -161,10 +155,7 @@ class Stock:
         self.lots = lru_cache(maxsize=CACHED_BLOCKS)(self.draw_lots)
 
     def draw_lots(self, block: int) -> tuple[Lot, ...]:
-        """Draw the lots of a block by its number alone.
-
-        `lots` keeps those of the blocks asked for last.
-        """
+        """Draw a block's lots by its number alone; `lots` keeps the last ones."""
         start, seed, (i, j) = self.first[block], self.city.seed, self.blocks[block]
         buildings = block_buildings(seed, i, j, self.terrain)[: self.city.buildings - start]
         return tuple(
@@ -173,33 +164,21 @@ class Stock:
         )
 
     def find_blocks(self, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
-        """Return the numbers of the blocks near a rectangle.
-
-        Near is within SURROUNDINGS_M of the rectangle from `lower` to `upper` (2,).
-        """
+        """Return the blocks within SURROUNDINGS_M of the rectangle from `lower` to `upper` (2,)."""
         is_near = (self.low < upper + SURROUNDINGS_M) & (self.high > lower - SURROUNDINGS_M)
         return np.flatnonzero(is_near.all(axis=1))
 
     def near(self, bounds: Bounds) -> list[Lot]:
-        """Return all lots of the blocks that reach into `bounds`.
-
-        Their trees and shadows count.
-        """
+        """Return lots of the blocks that reach into `bounds`, with trees and shadows."""
         blocks = self.find_blocks(np.array(bounds[:2]), np.array(bounds[2:]))
         return [lot for block in blocks for lot in self.lots(int(block))]
 
     def patches(self, bounds: Bounds) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Return the patches of `bounds` in or beside the city.
-
-        The country around it is not surveyed.
-        """
+        """Return the patches of `bounds` in or beside the city; the country is not surveyed."""
         return [patch for patch in divide_into_patches(bounds) if len(self.find_blocks(*patch))]
 
     def tiles(self) -> Iterator[Bounds]:
-        """Yield the squares of the city's tile size that touch a block.
-
-        They lie on round coordinates.
-        """
+        """Yield squares of the city's tile size, on round coordinates, that touch a block."""
         size = self.city.tile_m
         first, last = np.floor(self.low.min(axis=0) / size), np.ceil(self.high.max(axis=0) / size)
         for y in np.arange(first[1], last[1]) * size:
@@ -256,9 +235,6 @@ def write_city(folder: Path, city: City) -> Iterator[Written]:
 
 
 def holds(bounds: Bounds, lot: Lot) -> bool:
-    """Return whether a lot's building stands in a tile.
-
-    One on the border stands in one tile alone.
-    """
+    """Return whether a lot's building stands in a tile; one on the border, in one alone."""
     x, y, _ = lot.building.roof.frame.origin
     return bounds[0] <= x < bounds[2] and bounds[1] <= y < bounds[3]

@@ -36,10 +36,7 @@ DORMER_GAP_M, DORMER_BACK_M = 0.8, 0.3
 
 
 class CompoundLayout:
-    """The building's axes.
-
-    Parts are placed by their centre (u, v) and a number of quarter turns.
-    """
+    """The building's axes, in which parts stand by centre (u, v) and quarter turns."""
 
     def __init__(self, kappa: float):
         self.kappa = kappa
@@ -86,10 +83,7 @@ def random_compound(
 
 
 def make_winged(rng: np.random.Generator, layout: CompoundLayout, kind: str) -> list[Part]:
-    """Make a main body with one or two wings at right angles.
-
-    All are gables, all hips or all flat.
-    """
+    """Make a main body with one or two wings at right angles, all gables, hips or flat."""
     type = str(rng.choice(("gable", "hip", "flat"), p=(0.6, 0.2, 0.2)))
     width, eave = rng.uniform(6.5, 11.0), random_eave(rng)
     slope = math.tan(math.radians(rng.uniform(20, 50)))
@@ -121,10 +115,7 @@ def make_winged(rng: np.random.Generator, layout: CompoundLayout, kind: str) -> 
 
 
 def regular(type: str, length: float, width: float, slope: float) -> dict[str, float]:
-    """Return a gable, hip or flat roof of given plan and slope.
-
-    A hip has four equal slopes and is longer than wide.
-    """
+    """Return a gable, hip (four equal slopes, longer than wide) or flat roof."""
     parameters = {"length": float(length), "width": float(width)}
     if type != "flat":
         parameters["height"] = float(width / 2 * slope)
@@ -134,10 +125,7 @@ def regular(type: str, length: float, width: float, slope: float) -> dict[str, f
 
 
 def make_extended(rng: np.random.Generator, layout: CompoundLayout) -> list[Part]:
-    """Make a house with a lower annex along its eave.
-
-    It is a flat roof, or a lean-to that rises towards the house.
-    """
+    """Make a house with a lower annex along its eave, flat or rising towards the house."""
     type = str(rng.choice(("gable", "hip", "half_hip", "mansard", "asymmetric_gable", "gambrel")))
     house, eave = random_parameters(rng, type), random_eave(rng) + 2.0
     depth, span = rng.uniform(2.5, 5.0), house["length"] * rng.uniform(0.4, 1.0)
@@ -185,10 +173,7 @@ def saw_tooth_hall_and_office(rng: np.random.Generator, layout: CompoundLayout) 
 
 
 def houses_in_a_row(rng: np.random.Generator, layout: CompoundLayout) -> list[Part]:
-    """Make terraced houses of one depth, with ridges along the row.
-
-    Some are stepped, and now and then one is flat.
-    """
+    """Make terraced houses of one depth, ridges along the row, some stepped, a few flat."""
     count, depth = int(rng.integers(3, 7)), rng.uniform(7.5, 11.0)
     slope, eave, u = math.tan(math.radians(rng.uniform(28, 50))), random_eave(rng) + 1.0, 0.0
     parts = []
@@ -247,10 +232,7 @@ def dormer(
 
 
 def winged_hip_roof(rng: np.random.Generator, layout: CompoundLayout) -> list[Part]:
-    """Make a hip with two equal lower wings on one side or on both.
-
-    Wings are gables or hips.
-    """
+    """Make a hip with equal lower wings, gables or hips, on one side or on both."""
     type = str(rng.choice(("gable", "hip")))
     width, eave = rng.uniform(8.0, 12.0), random_eave(rng)
     slope = math.tan(math.radians(rng.uniform(22, 45)))
@@ -269,10 +251,7 @@ def winged_hip_roof(rng: np.random.Generator, layout: CompoundLayout) -> list[Pa
 
 
 def make_corner_hips(rng: np.random.Generator, layout: CompoundLayout) -> list[Part]:
-    """Make two hips of one width, slope and eave that share a corner.
-
-    Their ridges meet there at one height.
-    """
+    """Make two equal hips that share a corner, where their ridges meet at one height."""
     width, eave = rng.uniform(6.5, 10.5), random_eave(rng)
     slope = math.tan(math.radians(rng.uniform(20, 48)))
     length, reach = width * rng.uniform(1.7, 2.6), width * rng.uniform(0.7, 1.4)

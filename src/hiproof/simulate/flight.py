@@ -17,10 +17,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Beams:
-    """Beams by height, p(z) = xy0 + slope z, with `xy0` and `slope` (n, 2).
-
-    `shift` (n, 3) is the swath's registration error.
-    """
+    """Beams p(z) = xy0 + slope z, both (n, 2); `shift` (n, 3) is the swath's error."""
 
     xy0: np.ndarray
     slope: np.ndarray
@@ -64,10 +61,7 @@ def random_swaths(
     edge_probability: float,
     reach: float,
 ) -> list[Swath]:
-    """Draw one to three swaths that share `density` (points/m2).
-
-    The second and third may end within `reach` (m).
-    """
+    """Draw one to three swaths of `density` (points/m2); two may end within `reach` (m)."""
     count = 1 + int(rng.random() < 0.5) + int(rng.random() < 0.15)
     share = rng.uniform(0.6, 1.4, count)
     share *= density / share.sum()
@@ -99,10 +93,7 @@ def random_swaths(
 def make_beams(
     rng: np.random.Generator, swath: Swath, centre: np.ndarray, radius: float, z_ref: float
 ) -> Beams:
-    """Return beams of `swath` that cross a disc at height `z_ref`.
-
-    It has `radius` about `centre` (2,).
-    """
+    """Return beams of `swath` that cross a disc about `centre` (2,) at height `z_ref`."""
     cosine, sine = math.cos(swath.heading), math.sin(swath.heading)
     along_lines, phase, across_steps = lattice(rng, swath, radius)
     jitter = rng.normal(0.0, 0.07, (2, len(along_lines), len(across_steps)))
@@ -123,10 +114,7 @@ def make_beams(
 def lattice(
     rng: np.random.Generator, swath: Swath, radius: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Draw scan lines, each line's phase (0-1), and steps across track.
-
-    Lines and steps are in m from the centre, along and across track.
-    """
+    """Draw scan lines along, phases (0-1), and steps across track, in m from the centre."""
     lines = np.arange(int(2 * radius / swath.line_spacing) + 2)
     steps = np.arange(int(2 * radius / swath.point_spacing) + 2)
     if swath.anchor is None:

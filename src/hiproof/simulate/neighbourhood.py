@@ -55,10 +55,7 @@ def demo_files() -> dict[str, Path]:
 
 
 def neighbourhood(seed: int = DEMO_SEED) -> tuple[list[Lot], Relief]:
-    """Return lots and terrain of the neighbourhood.
-
-    Each name of STREETS stands once.
-    """
+    """Return lots and terrain of the neighbourhood, each name of STREETS once."""
     rng = np.random.default_rng([seed, 1])
     terrain = Relief.random(rng, GROUND_M, ORIGIN_XY)
     heading, start = math.radians(14.0), ORIGIN_XY.copy()
@@ -74,10 +71,7 @@ def neighbourhood(seed: int = DEMO_SEED) -> tuple[list[Lot], Relief]:
 
 
 def depth_across(building: SimBuilding, start: np.ndarray, heading: float) -> float:
-    """Return how far (m) a building reaches from a street.
-
-    The street begins at `start` (2,).
-    """
+    """Return how far (m) a building reaches from a street that begins at `start` (2,)."""
     corners = np.array(building.footprint.exterior.coords) - start
     return float(turn_points(corners, -heading)[:, 1].max())
 

@@ -21,20 +21,13 @@ class Plane:
         return xy @ (self.a, self.b) + self.c
 
     def hit(self, xy0: np.ndarray, slope: np.ndarray) -> np.ndarray:
-        """Return the height (n,) where the beams meet the terrain.
-
-        Beams are p(z) = xy0 + slope z.
-        """
+        """Return the height (n,) where beams p(z) = xy0 + slope z meet the terrain."""
         return self.height_at(xy0) / (1.0 - slope @ (self.a, self.b))
 
 
 @dataclass(frozen=True)
 class Relief:
-    """Hills as a sum of plane waves.
-
-    `waves` (w, 4) = (kx, ky, phase, amplitude in metres) about `base` (m); positions are taken
-    relative to `origin` (2,).
-    """
+    """Hills: plane `waves` (w, 4) = (kx, ky, phase, amplitude (m)) on `base`, by `origin`."""
 
     waves: np.ndarray
     base: float
@@ -42,10 +35,7 @@ class Relief:
 
     @classmethod
     def random(cls, rng: np.random.Generator, base: float, origin: np.ndarray) -> Relief:
-        """Draw waves of 140 to 1500 m with gentle slopes.
-
-        Their slopes together stay under about eight percent.
-        """
+        """Draw waves of 140 to 1500 m whose slopes together stay under about eight percent."""
         length = np.array([1500.0, 800.0, 420.0, 230.0, 140.0])
         direction, phase = rng.uniform(0.0, 2 * np.pi, (2, len(length)))
         k = 2 * np.pi / length
@@ -61,15 +51,9 @@ class Relief:
         )
 
     def move(self, shift: np.ndarray) -> Relief:
-        """Return the same terrain in a frame moved by `shift` (3,).
-
-        The frame's points are those of this one plus `shift`.
-        """
+        """Return the same terrain in a frame whose points are these plus `shift` (3,)."""
         return Relief(self.waves, self.base + float(shift[2]), self.origin + shift[:2])
 
     def hit(self, xy0: np.ndarray, slope: np.ndarray) -> np.ndarray:
-        """Return the height (n,) where the beams meet the terrain.
-
-        Beams are p(z) = xy0 + slope z.
-        """
+        """Return the height (n,) where beams p(z) = xy0 + slope z meet the terrain."""
         return cast_waves(xy0 - self.origin, slope, self.waves, self.base)

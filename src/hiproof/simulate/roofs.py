@@ -101,19 +101,13 @@ def random_building(
 def assemble(
     parts: tuple[Part, ...], kind: str, origin: np.ndarray | tuple[float, float, float]
 ) -> SimBuilding:
-    """Return `parts` as a building on the ground at `origin`.
-
-    The outline is the union of their pieces.
-    """
+    """Return `parts` as a building at `origin`; its outline is the union of their pieces."""
     roof = Roof(parts, united_outline(parts), LocalFrame(np.asarray(origin, float)))
     return SimBuilding(find_largest_part(roof).type, kind, roof, float(origin[2]))
 
 
 def find_largest_part(roof: Roof) -> Part:
-    """Return the part of the largest outline.
-
-    What others hide of it counts.
-    """
+    """Return the part of the largest outline, with what others hide of it."""
     return max(roof.parts, key=lambda part: part.area)
 
 
@@ -156,10 +150,7 @@ def turn_building(building: SimBuilding, angle: float) -> SimBuilding:
 
 
 def united_outline(parts: tuple[Part, ...]) -> shapely.Polygon:
-    """Return the union of all pieces.
-
-    They are joined in the axes of the first part, where common edges are exactly on one line.
-    """
+    """Return the union of all pieces, joined in the first part's axes, on common lines."""
     outlines = [piece.outline for part in parts for piece in part.pieces]
     if len(outlines) == 1:
         return outlines[0]
@@ -178,10 +169,7 @@ def turn_points(xy: np.ndarray, angle: float) -> np.ndarray:
 
 
 def random_eave(rng: np.random.Generator) -> float:
-    """Draw the height of the lowest eave over the ground.
-
-    It is that of one to four storeys, sheds included.
-    """
+    """Draw the lowest eave's height over the ground: one to four storeys, or a shed."""
     return float(rng.choice((2.4, 3.0, 5.5, 5.8, 8.5, 11.5)) + rng.uniform(-0.3, 0.5))
 
 

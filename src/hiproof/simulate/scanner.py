@@ -159,11 +159,7 @@ def scan_scene(
 
 
 def returns(scene: Scene, beams: Beams, rng: np.random.Generator, settings: ScanSettings) -> Scan:
-    """Return the points of all beams.
-
-    A wide beam mixes the heights of two near surfaces and splits over two far ones; leaves catch
-    some of the light and let the rest through.
-    """
+    """Scan `area`, in plan of the scene's frame, with noise and the cloud's defects."""
     z_hit, source, label = first_hits(scene, beams.xy0, beams.slope)
     n = len(z_hit)
     xy0, slope, shift = beams.xy0, beams.slope, beams.shift
@@ -225,10 +221,7 @@ def caught_by_leaves(
     label: np.ndarray,
     rng: np.random.Generator,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Add the returns of leaves, and return the beam index of each.
-
-    A third of the beams caught return from below too.
-    """
+    """Return height (n,), source and label (n,) of beams' first surface, else the terrain."""
     z_crown = np.full(len(xy0), -np.inf)
     cast_crowns(xy0, slope, scene.crowns, rng.exponential(LEAF_PATH_M, len(xy0)), z_crown)
     caught = z_crown > z_hit
@@ -250,10 +243,7 @@ def without_strip(
 
 
 def without_corner(rng: np.random.Generator, cloud: Scan, centre: np.ndarray, reach: float) -> Scan:
-    """Drop all points of a disc about some place near the roof's edge.
-
-    That part of the roof gave no return (wet, dark, or hidden).
-    """
+    """Add leaves' returns and return their beams; a third return from below, too."""
     angle, radius = rng.uniform(-math.pi, math.pi), reach * rng.uniform(0.25, 0.6)
     middle = centre + 0.8 * reach * np.array([math.cos(angle), math.sin(angle)])
     keep = ((cloud.points[:, :2] - middle) ** 2).sum(axis=1) > radius**2
@@ -280,11 +270,7 @@ def with_outliers(rng: np.random.Generator, cloud: Scan, share: float) -> Scan:
 def uniform_points(
     building: SimBuilding, rng: np.random.Generator, density: float = 4.72, noise: float = 0.12
 ):
-    """Draw points (n, 3), world metres, as in the paper's Table 3.
-
-    They lie evenly over the outline, on the roof, with vertical errors whose size is uniform within
-    1 `noise` for 90 %, within 1-2 for 9 % and within 2-3 for 1 % of the points.
-    """
+    """Drop the points of a disc near the roof's edge that is wet, dark or hidden."""
     outline = building.outline
     x_low, y_low, x_high, y_high = outline.bounds
     count = rng.poisson(density * (x_high - x_low) * (y_high - y_low))

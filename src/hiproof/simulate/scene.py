@@ -27,10 +27,7 @@ DISC_SLACK_M = 3.0  # a building's walls may go this far down below its own grou
 
 @dataclass(frozen=True)
 class Defects:
-    """Probabilities of a building's and a cloud's defects.
-
-    Outliers have a share.
-    """
+    """Probabilities of a building's and a cloud's defects, and outliers' share."""
 
     tree: float = 0.35
     chimney: float = 0.4
@@ -71,10 +68,7 @@ class Scene:
 
 @dataclass(frozen=True)
 class Body:
-    """A convex body: the prism of a piece's outline under its planes.
-
-    It has what a hit on its top is; the piece's frame is that of the scene less `shift` (3,).
-    """
+    """A prism of a piece's outline (frame less `shift`) under its planes, and what it is."""
 
     piece: Piece
     top_source: int = SOURCE_ROOF
@@ -113,10 +107,7 @@ def list_halfspaces(piece: Piece) -> np.ndarray:
 
 
 def bound_body(body: Body) -> tuple[float, float, float, float]:
-    """Return (x, y, z, radius) of a disc at z that bounds the body's beams.
-
-    Beams up to 45 degrees off the vertical that hit the body above ground pass it.
-    """
+    """Return the disc (x, y, z, radius) that beams up to 45 degrees pass to hit the body."""
     corners = shapely.get_coordinates(body.piece.outline)
     smallest, largest = corners.min(axis=0), corners.max(axis=0)
     x, y = (smallest + largest) / 2 + body.shift[:2]
@@ -130,10 +121,7 @@ def bound_body(body: Body) -> tuple[float, float, float, float]:
 def make_scene(
     bodies: Sequence[Body], crowns: np.ndarray | None = None, terrain: Plane | Relief | None = None
 ) -> Scene:
-    """Pack bodies for the beams.
-
-    `crowns` and `terrain` are in the scene's frame.
-    """
+    """Pack bodies, `crowns` and `terrain` in the scene's frame for the beams."""
     sides, discs, source, label = [np.empty((0, 4))], [], [], []
     for body in bodies:
         rows = list_halfspaces(body.piece)
@@ -164,10 +152,7 @@ def building_bodies(building: SimBuilding) -> list[Body]:
 
 
 def random_scene(rng: np.random.Generator, building: SimBuilding, defects: Defects) -> Scene:
-    """Draw the surroundings of `building`, in its local frame.
-
-    They are clutter, neighbours, trees and sloping ground as `defects` allows.
-    """
+    """Draw surroundings in a building's frame: clutter, neighbours, trees, sloping ground."""
     bodies = building_bodies(building) + superstructures(rng, building, defects)
     has_neighbour, has_tree = rng.random(2) < (defects.neighbour, defects.tree)
     if has_neighbour:
@@ -197,10 +182,7 @@ def superstructures(
 
 
 def place_on_roof(rng: np.random.Generator, building: SimBuilding) -> tuple[np.ndarray, Piece]:
-    """Draw a place on the roof, and the piece there.
-
-    It is at least 15 % away from a random piece's border.
-    """
+    """Draw a place on the roof, 15 % away from a random piece's border, and the piece."""
     pieces = building.roof.pieces
     piece = pieces[rng.integers(len(pieces))]
     corners = shapely.get_coordinates(piece.outline)[:-1]
@@ -224,10 +206,7 @@ def antenna(rng: np.random.Generator, building: SimBuilding) -> Body:
 
 
 def dormers(rng: np.random.Generator, building: SimBuilding) -> list[Body]:
-    """Draw one to three boxes that come out of a slope.
-
-    They meet it at their back; there are none on a flat roof.
-    """
+    """Draw one to three boxes out of a slope, which they meet behind; none on flat roofs."""
     bodies = []
     for _ in range(1 + int(2.5 * rng.random() ** 2)):
         xy, piece = place_on_roof(rng, building)
@@ -249,10 +228,7 @@ def dormers(rng: np.random.Generator, building: SimBuilding) -> list[Body]:
 
 
 def neighbour(rng: np.random.Generator, building: SimBuilding) -> list[Body]:
-    """Draw a building beside this one, wall to wall or some metres off.
-
-    Its points are clutter here.
-    """
+    """Draw a neighbour wall to wall or some metres off, whose points are clutter here."""
     part = building.largest
     type = ROOF_TYPES[rng.choice((0, 1, 2, 3))]
     parameters = random_parameters(rng, type)
@@ -273,10 +249,7 @@ def neighbour(rng: np.random.Generator, building: SimBuilding) -> list[Body]:
 
 
 def trees(rng: np.random.Generator, building: SimBuilding) -> np.ndarray:
-    """Draw one to three crowns (t, 5) that lean over the roof.
-
-    Trunks stand outside, mostly near a corner.
-    """
+    """Draw one to three crowns (t, 5) over the roof, trunks outside, mostly at a corner."""
     corners = shapely.get_coordinates(building.outline.exterior)[:-1]
     centre = corners.mean(axis=0)
     crowns = []
@@ -292,10 +265,7 @@ def trees(rng: np.random.Generator, building: SimBuilding) -> np.ndarray:
 
 
 def solids_scene(solids: list[Solid], labels: list[int]) -> Scene:
-    """Return closed solids as triangles.
-
-    Their RoofSurfaces carry `labels` (of `find_label`).
-    """
+    """Return closed solids as triangles, RoofSurfaces with `labels` (of `find_label`)."""
     triangles, source, label = [np.empty((0, 3, 3))], [], []
     for solid, roof_label in zip(solids, labels, strict=True):
         for face in solid.faces:
@@ -313,10 +283,7 @@ def solids_scene(solids: list[Solid], labels: list[int]) -> Scene:
 
 
 def triangulate(vertices: np.ndarray, rings: tuple[tuple[int, ...], ...]) -> np.ndarray:
-    """Return triangles (m, 3, 3) of one planar polygon with holes.
-
-    It is cut in the coordinate plane that it faces most.
-    """
+    """Return triangles (m, 3, 3) of a polygon with holes, cut in the plane it faces most."""
     outer = vertices[list(rings[0])]
     if len(rings) == 1 and len(outer) == 3:
         return outer[None]

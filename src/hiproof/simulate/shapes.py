@@ -24,10 +24,7 @@ network tells apart.
 
 
 def find_label(type: str | None) -> int:
-    """Return the label of a roof type's points.
-
-    It is its place in the catalogue, NOT_ROOF for what is none.
-    """
+    """Return the label of a roof type's points, its catalogue place, or NOT_ROOF."""
     return list(CATALOGUE).index(type) if type in CATALOGUE else NOT_ROOF
 
 
@@ -48,10 +45,7 @@ def make_part(
 def box(
     xy: np.ndarray, size: tuple[float, float], z_top: float, kappa: float, rise: float = 0.0
 ) -> Piece:
-    """Return a block of `size` (along, across) about `xy`, turned by `kappa`.
-
-    It is flat at `z_top`, or with `rise` a gable whose ridge is at `z_top`.
-    """
+    """Return a block about `xy` turned by `kappa`, flat, or a gable with `rise`, at `z_top`."""
     cosine, sine = math.cos(kappa), math.sin(kappa)
     corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * (size[0] / 2, size[1] / 2)
     outline = shapely.Polygon(corners @ np.array([(cosine, sine), (-sine, cosine)]) + xy)

@@ -49,10 +49,7 @@ class Flight:
     def plan_swaths(
         self, seed: int, centre: np.ndarray, radius: float, density: float
     ) -> list[Swath]:
-        """Return swaths of all flight lines that see a disc.
-
-        It has `radius` about `centre`; together they have `density` in the mean.
-        """
+        """Return flight lines' swaths, of `density` in the mean, that see a disc of `radius`."""
         half_width = self.altitude_m * math.tan(math.radians(self.half_view_deg))
         spacing = math.sqrt(2 * half_width / self.line_distance_m / density)
         along, across = turn_points((centre - self.origin)[None], -self.heading)[0]
@@ -79,10 +76,7 @@ class Flight:
 
 
 def divide_into_patches(bounds: Bounds) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Return the corners (2,) of the patches that tile `bounds`.
-
-    They are lowest and highest, of patches of at most PATCH_M.
-    """
+    """Return lowest and highest corners (2,) of patches of at most PATCH_M in `bounds`."""
     lower, upper = np.array(bounds[:2]), np.array(bounds[2:])
     columns, rows = np.ceil((upper - lower) / PATCH_M).astype(int)
     corners = [lower + PATCH_M * np.array([i, j]) for i in range(columns) for j in range(rows)]
@@ -122,10 +116,7 @@ def surveyed_patch(
     seed: int,
     settings: ScanSettings,
 ) -> Scan:
-    """Return the points of one patch, drawn from a seed of its place.
-
-    Its corners are `lower` and `upper` (2,).
-    """
+    """Return the points of the patch `lower` to `upper` (2,), by a seed of its place."""
     xy_centre = (lower + upper) / 2
     centre = np.array([*xy_centre, float(terrain.height_at(xy_centre[None])[0])])
     rng = np.random.default_rng([seed, 3, *(np.round(xy_centre * 100).astype(np.int64) % 2**32)])
@@ -144,10 +135,7 @@ def surveyed_patch(
 
 
 def assign_classes(cloud: Scan) -> np.ndarray:
-    """Return ASPRS classes as producers deliver them.
-
-    They are ground 2, trees 5, and all that is built 6.
-    """
+    """Return ASPRS classes as producers deliver: ground 2, trees 5, all that is built 6."""
     classes = np.full(len(cloud), CLASS_BUILDING, np.uint8)
     classes[cloud.source == SOURCE_GROUND] = CLASS_GROUND
     classes[cloud.source == SOURCE_TREE] = CLASS_TREE
@@ -155,10 +143,7 @@ def assign_classes(cloud: Scan) -> np.ndarray:
 
 
 def write_laz(path: Path, clouds: Iterator[Scan], origin: np.ndarray, scale_m: float = 0.01) -> int:
-    """Write clouds to one LAZ 1.4 file, streamed; return the number of points.
-
-    Raises OutputError where it cannot be written.
-    """
+    """Write clouds to one LAZ 1.4, streamed; return the count, OutputError if it cannot."""
     import laspy
     from pyproj import CRS as ProjCRS
 

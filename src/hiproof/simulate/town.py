@@ -26,11 +26,7 @@ TOWN_DEFECTS = replace(Defects.none(), tree=0.45, chimney=0.45, dormer=0.2, ante
 
 @dataclass(frozen=True)
 class Lot:
-    """One building where it stands.
-
-    `id` is its name, `bodies` all that is built in the building's frame and `crowns` (t, 5) the
-    trees around it in world coordinates.
-    """
+    """A building `id` where it stands, its `bodies` in its frame, world `crowns` (t, 5)."""
 
     id: str
     building: SimBuilding
@@ -55,10 +51,7 @@ def make(rng: np.random.Generator, name: str, kappa: float) -> SimBuilding:
 
 
 def standing_at(building: SimBuilding, xy: np.ndarray, terrain: Relief) -> SimBuilding:
-    """Move a building so that it stands at `xy` (world).
-
-    Its frame's origin lies there, on the lowest ground under its outline.
-    """
+    """Move a building's origin to `xy` (world), on the lowest ground under its outline."""
     corners = shapely.get_coordinates(building.outline) + xy
     z_ground = round(float(terrain.height_at(corners).min()), 3)
     frame = LocalFrame(np.array([*np.round(xy, 3), z_ground]))
@@ -66,10 +59,7 @@ def standing_at(building: SimBuilding, xy: np.ndarray, terrain: Relief) -> SimBu
 
 
 def build_row(row: SimBuilding) -> list[SimBuilding]:
-    """Return a row of houses as single buildings, all in the row's frame.
-
-    They have common walls.
-    """
+    """Return a row of houses as single buildings with common walls, in the row's frame."""
     roofs = [Roof((part,), part.pieces[0].outline, row.roof.frame) for part in row.roof.parts]
     return [
         SimBuilding(find_largest_part(roof).type, "terraced", roof, row.z_ground) for roof in roofs
@@ -124,10 +114,7 @@ def street_side(
 
 
 def extent(building: SimBuilding, heading: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the lowest and highest corner (2,) of the outline.
-
-    Axes are turned by `heading`.
-    """
+    """Return the outline's lowest and highest corner (2,) in axes turned by `heading`."""
     corners = turn_points(shapely.get_coordinates(building.outline), -heading)
     return corners.min(axis=0), corners.max(axis=0)
 

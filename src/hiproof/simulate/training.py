@@ -63,10 +63,7 @@ def random_settings(
     n_points: tuple[int, int],
     defects: Defects | None,
 ) -> ScanSettings:
-    """Draw scanner settings that give a building about `n_points`.
-
-    Its area is `area_m2`, and the density lies within `density`.
-    """
+    """Draw scanner settings for about `n_points` on `area_m2`, within `density`."""
     smallest = min(max(density[0], n_points[0] / area_m2), density[1])
     largest = max(min(density[1], 1.2 * n_points[1] / area_m2), smallest)
     logarithm, range_noise, horizontal, beam, angle, margin = rng.random(6)

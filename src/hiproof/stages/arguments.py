@@ -11,10 +11,7 @@ from .recognise import asks_network
 
 
 def refuse_other_kinds(footprint: object, terrain: object, settings: object) -> None:
-    """Raise InputError for arguments of another kind, by their own names.
-
-    What they hold may be anything.
-    """
+    """Raise InputError for arguments of another kind, by their names, whatever they hold."""
     if footprint is not None and not isinstance(footprint, (shapely.Geometry, Footprint)):
         raise InputError(
             f"expected a polygon of shapely as footprint, got {type(footprint).__name__}; make a "

@@ -23,10 +23,7 @@ LIKELY = 0.05
 
 @dataclass(frozen=True)
 class Fitted:
-    """Parts over an outline in the local frame, and the outcome of the fit.
-
-    It says how they were chosen.
-    """
+    """Parts over an outline in the local frame, and how the fit chose them."""
 
     parts: tuple[Part, ...]
     outline: shapely.Polygon
@@ -39,10 +36,7 @@ class Fitted:
 def fit(
     points: np.ndarray, outline: shapely.Polygon | None, recognised: Recognised, settings: Settings
 ) -> Fitted:
-    """Fit roof parts to the points.
-
-    It is one primitive (the paper's case) or as many as the evidence pays for.
-    """
+    """Fit roof parts to the points: one primitive (the paper's), or as many as pay."""
     if len(points) < FEWEST_POINTS:
         return flat(points, outline, Status.FLAT_FALLBACK)
     road = fit_one if fits_one(settings) else fit_several
@@ -57,10 +51,7 @@ def fit(
 def fit_several(
     points: np.ndarray, outline: shapely.Polygon | None, recognised: Recognised, settings: Settings
 ) -> Fitted:
-    """Fit as many volumes as the evidence pays for.
-
-    The network's opinion of the whole building does not matter to them.
-    """
+    """Fit as many volumes as the evidence pays for, whatever the network says."""
     from ..fit.roof import fit_building
 
     building = fit_building(points, outline, settings)
@@ -73,10 +64,7 @@ def fit_several(
 
 
 def last_resort(parts: tuple[Part, ...], settings: Settings) -> str:
-    """Return a sentence where parts became flat against the settings.
-
-    Only other types were requested. It is empty otherwise.
-    """
+    """Return a sentence where parts became flat against the types requested, else ""."""
     types = settings.fit.types
     flat = sum(part.type == "flat" for part in parts)
     if not types or "flat" in types or not flat:

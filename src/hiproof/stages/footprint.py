@@ -20,10 +20,7 @@ if TYPE_CHECKING:
 
 
 def start_building(footprint: shapely.Polygon | Footprint | None, id: str) -> Building:
-    """Return the outcome to start from.
-
-    It has the building's name, its footprint and its attributes.
-    """
+    """Return the outcome to start from, with the building's name, footprint, attributes."""
     if isinstance(footprint, Footprint):
         input_values = {
             "footprint": footprint.polygon,
@@ -68,10 +65,7 @@ def align_footprint(
 
 
 def shift_remark(result: Shift, of_row: int = 1) -> str:
-    """Return a remark on a moved footprint or a roof of another size.
-
-    It moved alone or with a row of so many. The remark is empty where there is neither.
-    """
+    """Return a remark on a footprint moved, alone or by row, or a roof's size, else ""."""
     remarks = []
     if result.is_clear:
         error = float(np.hypot(*result.sigma))

@@ -29,11 +29,7 @@ less far down.
 
 @dataclass(frozen=True)
 class Ground:
-    """The lower end of walls: its height, source and terrain line.
-
-    The height is in the world, and the line runs along the outline. `known_share` is the share of
-    the line's vertices whose height is known.
-    """
+    """Walls' lower end (world), source, and terrain line, of which `known_share` is known."""
 
     z: float
     source: str
@@ -49,10 +45,7 @@ def look_at_ground(
     terrain: Terrain | None,
     settings: Settings,
 ) -> Site:
-    """Remove bare ground from points and outline, both in the local frame.
-
-    The result may be that nothing stands there.
-    """
+    """Remove bare ground from points and outline (local); it may be that nothing stands."""
     from ..fit.site import Site, look_at_ground
 
     if outline is None or (terrain is None and ground is None):
@@ -106,10 +99,7 @@ def find_ground(
 
 
 def assume_ground(points: np.ndarray, roof: Roof | None) -> tuple[float, str]:
-    """Return an assumed ground height, and the reason for it.
-
-    It is in the frame of the points (n, 3), where nothing else gives it.
-    """
+    """Return an assumed ground height in the frame of points (n, 3), and the reason."""
     lowest, usual = float(points[:, 2].min()), f"assumed {ASSUMED_WALL_M:g} m below"
     eave = math.inf
     if roof is not None:
@@ -126,10 +116,7 @@ def assume_ground(points: np.ndarray, roof: Roof | None) -> tuple[float, str]:
 
 
 def query_terrain(terrain: Terrain, xy_world: np.ndarray) -> tuple[np.ndarray, str]:
-    """Return terrain heights (n,) at `xy_world` (n, 2), and their source.
-
-    It is the source that answered first.
-    """
+    """Return terrain heights (n,) at `xy_world` (n, 2), and the source that answered first."""
     if hasattr(terrain, "heights_and_sources"):
         heights, sources = terrain.heights_and_sources(xy_world)
         return heights, sources[0] if sources else terrain.source

@@ -34,10 +34,7 @@ def judge(
     settings: Settings,
     unused: np.ndarray | None = None,
 ) -> Building:
-    """Return the finished building, in the world's frame.
-
-    It has quality measured on its solid, an honest status, the verdict and doubts.
-    """
+    """Return the building in the world with quality of its solid, status, verdict, doubts."""
     from ..compose.settle import round_building
     from ..evaluate.metrics import quality, well_inside
 
@@ -62,10 +59,7 @@ def judge(
 
 
 def select_unused(roof: Roof, unused: np.ndarray | None) -> np.ndarray:
-    """Return the `unused` points inside a roof's outline, in its frame.
-
-    They are world points (m, 3), and have to be finite.
-    """
+    """Return the finite `unused` world points (m, 3) inside the outline, in the roof's frame."""
     if unused is None:
         return np.zeros((0, 3))
     local = roof.frame.to_local(finite(as_xyz(unused)))
@@ -75,11 +69,7 @@ def select_unused(roof: Roof, unused: np.ndarray | None) -> np.ndarray:
 def grade_building(
     building: Building, points: np.ndarray, unused: np.ndarray | None = None
 ) -> Building:
-    """Add the verdict on a building's model.
-
-    It is by its `points` (n, 3), in the roof's frame, and by those that its fit left `unused` (m,
-    3).
-    """
+    """Add the verdict by `points` (n, 3), in the roof's frame, and `unused` ones (m, 3)."""
     from ..evaluate.verdict import judge_model
 
     grade, reasons = judge_model(building.model, points, unused)

@@ -23,10 +23,7 @@ of them.
 
 
 def largest_polygon(geometry: shapely.Geometry) -> shapely.Polygon:
-    """Return the largest polygon of a geometry, made valid.
-
-    It is empty where there is none.
-    """
+    """Return the largest polygon of a geometry made valid, empty where there is none."""
     geometry = geometry if geometry.is_valid else repair_polygons(geometry)
     if geometry.geom_type == "Polygon":
         return geometry
@@ -72,10 +69,7 @@ def without_needless_vertices(
 
 
 def simplify_outline(polygon: shapely.Polygon, tolerance_m: float) -> shapely.Polygon:
-    """Simplify a polygon by Douglas and Peucker.
-
-    Their time grows with the square of the vertices, so thousands go piece by piece.
-    """
+    """Simplify by Douglas and Peucker, thousands of vertices by pieces: time is quadratic."""
     rings = []
     for ring in (polygon.exterior, *polygon.interiors):
         previous, xy = math.inf, shapely.get_coordinates(ring)

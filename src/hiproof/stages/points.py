@@ -22,10 +22,7 @@ LINE_WIDTH_M = 0.05
 def usable(
     points: np.ndarray, footprint: shapely.Polygon | None
 ) -> tuple[np.ndarray, shapely.Polygon | None, Status]:
-    """Return finite, distinct points inside the footprint, in one order.
-
-    The order in which they came does not matter.
-    """
+    """Return finite, distinct points inside the footprint, whatever order they came in."""
     if footprint is not None:
         footprint = largest_polygon(footprint)
         if footprint.is_empty or not footprint.area >= 0.1:
@@ -70,19 +67,13 @@ def compress_inside(points: np.ndarray, area: shapely.Geometry) -> np.ndarray:
 
 
 def finite(points: np.ndarray) -> np.ndarray:
-    """Return the points (n, 2 or 3) with coordinates of this Earth.
-
-    They are numbers; what stands for no value may be 3.4e38.
-    """
+    """Return the points (n, 2 or 3) of this Earth; no value may be stored as 3.4e38."""
     is_usable = is_plausible(points)
     return points if is_usable.all() else points[is_usable]
 
 
 def distinct(points: np.ndarray) -> np.ndarray:
-    """Sort points (n, 3) by x, y, z, without repeats.
-
-    The same set gives the same array.
-    """
+    """Sort points (n, 3) by x, y, z, without repeats; the same set gives the same array."""
     # complex numbers are in order by x, then by y
     plan = np.ascontiguousarray(points[:, :2]).view(complex)[:, 0]
     order = np.argsort(plan)

@@ -28,19 +28,13 @@ def fits_one(settings: Settings) -> bool:
 
 
 def asks_network(settings: Settings) -> bool:
-    """Return whether the network is used.
-
-    With `auto` it is only where one primitive is fitted to a building.
-    """
+    """Return whether the network is used: with `auto` only to fit one primitive."""
     network = settings.segment.network
     return network == "always" or (network == "auto" and fits_one(settings))
 
 
 def recognise(points: np.ndarray, settings: Settings) -> Recognised:
-    """Ask the network for its opinion of the points (paper section 3.1).
-
-    There is none where nobody heeds or asks for it, or it cannot tell.
-    """
+    """Return the network's opinion (paper section 3.1), none if unheeded or it cannot tell."""
     if not asks_network(settings):
         return Recognised()
     from ..segment import segment

@@ -63,10 +63,7 @@ def solid_or_simpler(
 
 
 def reach_terrain(building: Building, ground: Ground, settings: Settings) -> Building:
-    """Return the building with walls down to the terrain, where settings say so.
-
-    A remark says where they end at one level all the same.
-    """
+    """Return the building with walls down to the terrain if so set; a remark if not."""
     if building.built is None or settings.reconstruct.walls == "level":
         return building
     if not ground.intersection:
@@ -100,10 +97,7 @@ def list_passages(
 def open_passages(
     building: Building, ground: Ground, footprint: shapely.Geometry | Footprint | None
 ) -> Building:
-    """Return the building with the passages of its footprint below it.
-
-    A remark says which were left out, and why.
-    """
+    """Return the building with its footprint's passages; a remark says which are not."""
     passages = list_passages(footprint, building.shift)
     if building.built is None or not passages:
         return building
@@ -122,10 +116,7 @@ def open_passages(
 
 
 def add_installations(building: Building, points: np.ndarray, settings: Settings) -> Building:
-    """Return the building with the objects on its roof, where settings say so.
-
-    Its `points` (n, 3) are in the roof's frame.
-    """
+    """Return the building with objects on its roof if so set; `points` in its frame."""
     if building.built is None or not settings.reconstruct.installations:
         return building
     from ..fit.installations import find_installations

@@ -85,10 +85,7 @@ def make_policy(page: str) -> str:
 
 
 class ViewHandler(LoopbackHandler):
-    """Serves the page and the files of a folder, and nothing outside it.
-
-    It lists no folder.
-    """
+    """Serves the page and the files of a folder, and nothing outside it, not even lists."""
 
     def __init__(self, *args, directory: str, page: str, **named) -> None:
         self.folder, self.page, self.policy = (

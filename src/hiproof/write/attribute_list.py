@@ -16,10 +16,7 @@ from ..primitives.contract import SIDES
 
 
 class Attribute(NamedTuple):
-    """A named value of a `kind`: text, number, count, flag, list or object.
-
-    `unit` is empty where there is none. The `type` says more of a value in parameters.jsonl.
-    """
+    """A named value of a `kind`, `unit` and meaning; `type` says more in parameters.jsonl."""
 
     name: str
     kind: str
@@ -132,10 +129,7 @@ their own names. Lengths are metres also where coordinates are not. Made by `hip
 
 
 def attributes_text() -> str:
-    """Return all tables as Markdown.
-
-    `hiproof attributes` prints them, and docs/attributes.md holds them.
-    """
+    """Return all tables as Markdown, as `hiproof attributes` and docs/attributes.md have."""
     return "\n".join([PREFACE, files_text(), *map(table_text, TABLES.values())])
 
 

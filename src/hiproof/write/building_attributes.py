@@ -238,10 +238,7 @@ def change_attributes(change: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def check_as_written(solid: Solid, units: Units) -> str:
-    """Return ISO 19107's codes against the solid as it is written, as JSON.
-
-    Only solids that pass the check get here; in another CRS they are checked again.
-    """
+    """Return ISO 19107's codes as JSON against the solid as written, in another CRS, too."""
     if not isinstance(units, Reprojected):
         return "[]"
     from ..compose import check_solid

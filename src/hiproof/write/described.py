@@ -15,10 +15,7 @@ from .parameters import crs_text
 
 
 class Described(NamedTuple):
-    """A building with `figures` and `attributes`.
-
-    `figures` are those of its solid (None without one), `attributes` as files hold them.
-    """
+    """A building with the `figures` of its solid, if any, and `attributes` as in files."""
 
     building: Building
     figures: RoofFigures | None

@@ -62,18 +62,12 @@ def output_error(path: str | os.PathLike, error: OSError) -> OutputError:
 
 
 def elsewhere(error: OutputError, command: str) -> OutputError:
-    """Add the `command` that writes elsewhere to an error.
-
-    The user did not choose the place.
-    """
+    """Add the `command` that writes elsewhere to an error on a place nobody chose."""
     return OutputError(f"{error}. Write elsewhere with `{command}`")
 
 
 class OutputFile(io.FileIO):
-    """A raw file whose failing writes raise OutputError.
-
-    It is opened for exclusive writing (and reading back).
-    """
+    """A raw file for exclusive writing and reading back; failing writes raise OutputError."""
 
     def __init__(self, hidden: Path, path: Path):
         self.path = path
@@ -143,10 +137,7 @@ def atomic(path: str | os.PathLike) -> Iterator[Path]:
 
 @contextmanager
 def atomic_file(path: str | os.PathLike) -> Iterator[BinaryIO]:
-    """Yield a binary file that becomes `path` when the block ends well.
-
-    It is buffered, seekable and readable; see `atomic`.
-    """
+    """Yield a buffered, seekable binary file that becomes `path` at a good end; see `atomic`."""
     with atomic(path) as hidden, open_hidden(hidden, Path(path)) as file:
         yield file
 
@@ -159,10 +150,7 @@ def save_text(path: str | os.PathLike, text: str) -> None:
 
 @contextmanager
 def scratch(path: str | os.PathLike) -> Iterator[BinaryIO]:
-    """Yield a temporary binary file beside `path`, gone when the block ends.
-
-    A full disk raises OutputError.
-    """
+    """Yield a binary file beside `path` for the block; a full disk raises OutputError."""
     hidden = hidden_name(Path(os.path.realpath(path)))
     try:
         with open_hidden(hidden, Path(path)) as file:
@@ -173,10 +161,7 @@ def scratch(path: str | os.PathLike) -> Iterator[BinaryIO]:
 
 @contextmanager
 def whole_folder(folder: Path) -> Iterator[Path]:
-    """Yield a hidden folder that takes the place of `folder`.
-
-    It does so when the block ends well, and is removed when not.
-    """
+    """Yield a hidden folder that replaces `folder` when the block ends well, or is removed."""
     name = hidden_name(folder)
     older = name.with_name(name.name + "-older")
     try:
@@ -210,10 +195,7 @@ def open_hidden(hidden: Path, path: Path) -> Iterator[BinaryIO]:
 
 
 def remove(path: Path) -> None:
-    """Remove a file or a folder if it can be.
-
-    Where a file system is read-only there is none, and the error before it is the one to report.
-    """
+    """Remove a file or folder if it can be: the error before this one is to be reported."""
     if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path, ignore_errors=True)
         return
@@ -222,10 +204,7 @@ def remove(path: Path) -> None:
 
 
 def hidden_name(path: Path) -> Path:
-    """Return a free name beside `path` that listings do not show.
-
-    It has the same suffix. What killed processes left under such names is removed.
-    """
+    """Return a free hidden name beside `path`, and remove what killed processes left there."""
     start = f".{path.name[:40]}-{zlib.crc32(platform.node().encode()):08x}-"
     pattern = re.compile(re.escape(start) + r"(\d+)-[0-9a-f]{8}\b")
     with suppress(OSError), os.scandir(path.parent) as entries:
@@ -249,10 +228,7 @@ def is_running(process: int) -> bool:
 
 
 def sync(path: Path) -> None:
-    """Ask the operating system to put a file or folder on disk.
-
-    Folders cannot be opened everywhere, and Windows does so only for files opened for writing.
-    """
+    """Sync a file or folder; not all systems open folders, and Windows no read-only files."""
     try:
         descriptor = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)
     except PermissionError:
@@ -273,10 +249,7 @@ OWN_FILES = frozenset(
 
 
 def refuse_overwriting(outputs: Iterable[Path], inputs: Iterable[Any]) -> None:
-    """Raise OutputError where a file to write is one that is read.
-
-    `inputs` may be folders, addresses and None, which are no files.
-    """
+    """Raise OutputError where an output is one of `inputs` (folders, addresses, None are not)."""
     files = [Path(str(path)) for path in inputs if path and is_file(str(path))]
     for out in map(Path, outputs):
         if out.exists() and any(out.samefile(file) for file in files):

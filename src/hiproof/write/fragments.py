@@ -61,10 +61,7 @@ class Sheet:
 
     @functools.cached_property
     def boxes(self) -> tuple[Solid, ...]:
-        """The installations of the building as solids, in the world.
-
-        They belong to LoD2.
-        """
+        """The building's installations as solids of LoD2, in the world."""
         model = self.building.built
         if model is None or not model.installations or not self.head.write.has_lod2:
             return ()
@@ -76,10 +73,7 @@ class Sheet:
 
 @dataclass(frozen=True)
 class Fragment:
-    """A building's part of a run's file: its bytes, and its extent there.
-
-    The extent is low x y z, high x y z, None where it has none.
-    """
+    """A building's bytes in a run's file, and their extent (low x y z, high x y z) or None."""
 
     text: bytes
     extent: tuple[float, ...] | None = None
@@ -101,10 +95,7 @@ def save_fragments(file: BinaryIO, parts: Sequence[Fragments]) -> None:
 
 
 def load_fragments(path: Path) -> Iterator[Fragments]:
-    """Load the buildings that `save_fragments` wrote to `path`.
-
-    Raises OutputError for a file that is not whole.
-    """
+    """Load buildings of `save_fragments`; raises OutputError for a file that is not whole."""
     try:
         with np.load(path, allow_pickle=False) as arrays:
             kinds = [name for name in arrays.files if not name.endswith((ENDS, EXTENT))]
@@ -120,10 +111,7 @@ def load_fragments(path: Path) -> Iterator[Fragments]:
 
 
 def column(joined: np.ndarray, ends: np.ndarray, extents: np.ndarray) -> list[Fragment]:
-    """Split joined texts with their extents.
-
-    The bytes stand one after the other in `joined` (n,), each up to its end, with extents (b, 6).
-    """
+    """Split joined texts (n,) at their `ends`, each with its extent (b, 6)."""
     content, starts = joined.tobytes(), [0, *ends.tolist()]
     texts = [content[start:end] for start, end in itertools.pairwise(starts)]
     extents_or_none = [

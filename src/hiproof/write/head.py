@@ -58,10 +58,7 @@ class FileHead:
 
     @functools.cached_property
     def crs_of_files(self) -> Any:
-        """The CRS that files name: the run's, or what `--out-crs` asks for.
-
-        Parameters stay in the run's.
-        """
+        """The CRS that files name, `--out-crs` or the run's, which parameters stay in."""
         from .reprojected import choose_file_crs
 
         return choose_file_crs(self.crs, self.write.out_crs) if self.write.out_crs else self.crs

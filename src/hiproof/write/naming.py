@@ -93,10 +93,7 @@ def reference_system(crs: Any) -> str | None:
 
 
 def plan_wkt(crs: Any) -> str | None:
-    """Return WKT of the plan component of `crs`, for layers without heights.
-
-    It is None when `crs` is.
-    """
+    """Return WKT of the plan of `crs` for layers without heights, None without one."""
     from ..read.crs import horizontal_crs, parse_crs
 
     crs = parse_crs(crs)

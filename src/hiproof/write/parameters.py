@@ -235,10 +235,7 @@ def number(value: float, digits: int = LENGTH_DIGITS) -> float | None:
 
 
 def places(xyz: np.ndarray) -> list[list[float | None]]:
-    """Return a line (m, 3) with each vertex as from `numbers`.
-
-    All go at once where all are known.
-    """
+    """Return a line (m, 3) as `numbers` of vertices, at once where all are known."""
     if not np.isfinite(xyz).all():
         return [numbers(place) for place in xyz.tolist()]
     return (np.round(xyz, LENGTH_DIGITS) + 0.0).tolist()

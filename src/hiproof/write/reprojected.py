@@ -43,10 +43,7 @@ class Reprojected(Units):
     height_m: float = 1.0
 
     def from_metres(self, world: np.ndarray) -> np.ndarray:
-        """Return the file's coordinates of world metres (..., 2) or (..., 3).
-
-        Raises InputError for places that have none there.
-        """
+        """Return file coordinates of world metres (..., 2 or 3); InputError without any there."""
         world = np.asarray(world, float)
         coordinates = self.own.from_metres(world)
         result = np.stack(
@@ -142,10 +139,7 @@ def make_reprojection(crs: Any, out: Any, source_units: Units, units: Units) -> 
 
 
 def height_way(crs: Any, out: Any) -> Any:
-    """Return pyproj's transformer from one CRS with heights to another.
-
-    Raises InputError where heights or a grid are missing.
-    """
+    """Return the transformer of two CRSs with heights; InputError if these or grids lack."""
     way = find_best_transformer(crs, out, allow_ballpark=False) if has_heights(crs) else None
     if way is None:
         missing = (

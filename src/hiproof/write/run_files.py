@@ -98,10 +98,7 @@ def join_fragments(files: dict[str, Path], parts: Iterable[Fragments], head: Fil
 
 
 def measure_or_drop_solid(building: Building) -> tuple[Building, RoofFigures | None]:
-    """Return `building` and its solid's figures.
-
-    A solid that cannot be measured is dropped.
-    """
+    """Return the building and its figures, or without a solid that has none."""
     try:
         if building.built is not None and not np.isfinite(building.solid.vertices).all():
             raise ValueError("its solid has coordinates that are not numbers")

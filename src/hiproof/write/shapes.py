@@ -66,10 +66,7 @@ NO_SHAPES = Shapes()
 def make_shapes(
     building: Building, figures: RoofFigures | None, write: WriteSettings, prefix: str = PREFIX
 ) -> Shapes:
-    """Return the shapes of `building` that `write` asks for.
-
-    `figures` are those of its solid, None without one.
-    """
+    """Return the shapes that `write` asks for; `figures` are the solid's, None without."""
     lods = set(write.lods)
     if (
         building.built is None
@@ -92,10 +89,7 @@ def make_shapes(
 
 
 def cut_into_parts(building: Building) -> tuple[BuildingPart, ...]:
-    """Return the building's parts, each with the underside of the whole.
-
-    There are none where one would have no valid solid.
-    """
+    """Return the parts, with the whole's underside, none where one would be invalid."""
     from ..compose.building_parts import building_parts
     from ..compose.underside import finish_solid
 
@@ -114,20 +108,14 @@ def cut_into_parts(building: Building) -> tuple[BuildingPart, ...]:
 
 
 def whole_block(solid: Solid, ground: Face, figures: RoofFigures) -> Solid:
-    """Return LoD1.2: one block over the outline.
-
-    It is as high as seven tenths of the roof lie below (as 3DBAG has it).
-    """
+    """Return LoD1.2: a block as high as 7/10 of the roof lie below (as in 3DBAG)."""
     from ..compose.blocks import block
 
     return block(solid.project_face(ground), figures.h_base, metres(figures.h_70p))
 
 
 def make_stepped_block(cut: tuple[BuildingPart, ...], figures: RoofFigures) -> Solid | None:
-    """Return LoD1.3 as one solid: a block for each building part.
-
-    Each is as high as seven tenths of its own roof lie below.
-    """
+    """Return LoD1.3: a block a part as high as 7/10 of its roof lie below."""
     from ..compose.blocks import blocks
 
     heights = [metres(roof_figures(part.solid).h_70p) for part in cut]
@@ -156,10 +144,7 @@ def part_shapes(
 def part_shape(
     part: BuildingPart, primitives: list[dict[str, Any]], requested: set[str], prefix: str
 ) -> PartShape:
-    """Return a building part with its figures, block and attributes.
-
-    It is made of these roof parts.
-    """
+    """Return a part of these roof parts with its figures, block and attributes."""
     from ..compose.blocks import block
 
     figures = roof_figures(part.solid)

@@ -66,10 +66,7 @@ def measure_angles(figures: RoofFigures, faces: Sequence[int]) -> tuple[float, f
 def join_values(
     values: Mapping[int, Mapping[str, Any]], numbers: Sequence[int], figures: RoofFigures
 ) -> dict[int, dict[str, Any]]:
-    """Return further values by surface from those by face.
-
-    Those of several faces are summed, or are their mean by area.
-    """
+    """Return further values by surface, those of several faces summed or averaged by area."""
     groups = group_faces(numbers)
     joined: dict[int, dict[str, Any]] = {}
     for face, of_face in values.items():

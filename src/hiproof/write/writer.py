@@ -43,10 +43,7 @@ class BuildingWriter(AbstractContextManager["BuildingWriter", bool | None]):
                 self.add(building)
 
     def begin(self, stack: ExitStack) -> None:
-        """Write what comes before the first building.
-
-        `stack` closes what the format opens beside the file.
-        """
+        """Write what precedes the first building; `stack` closes what is opened beside the file."""
 
     def add(
         self,
@@ -54,10 +51,7 @@ class BuildingWriter(AbstractContextManager["BuildingWriter", bool | None]):
         figures: RoofFigures | None = None,
         attributes: dict[str, Any] | None = None,
     ) -> None:
-        """Write one building.
-
-        `figures` are those of its solid, and `attributes` its own, if the caller has them already.
-        """
+        """Write one building, its solid's `figures` and its `attributes` if they are known."""
         figures = figures or measure_figures(building)
         if attributes is None:
             osm = self.head.write.osm_tags
@@ -72,10 +66,7 @@ class BuildingWriter(AbstractContextManager["BuildingWriter", bool | None]):
 
     @abstractmethod
     def put(self, fragment: Fragment) -> None:
-        """Write a building whose text the format's `fragment` made.
-
-        It was made here or in another process.
-        """
+        """Write a building whose text `fragment` made, here or in another process."""
 
     def finish(self) -> None:
         """Write what comes after the last building."""

@@ -70,20 +70,14 @@ def parse_crs(value: Any) -> CRS | None:
 
 
 def translate_adv(name: str) -> str:
-    """Return the EPSG codes of a name of the German surveying authorities.
-
-    Other names stay.
-    """
+    """Return the EPSG codes of a name of the German surveying authorities, else the name."""
     parts = name.strip().removeprefix("urn:adv:crs:").split("*")
     codes = [ADV_NAMES.get(part) for part in parts]
     return name if None in codes else "EPSG:" + "+".join(map(str, codes))
 
 
 def read_named_crs(name: Any, path: Any) -> CRS | None:
-    """Return the CRS that a file names.
-
-    None, with a warning, where PROJ does not know it.
-    """
+    """Return the CRS that a file names; None, with a warning, where PROJ does not know it."""
     try:
         return parse_crs(name)
     except InputError:
@@ -122,10 +116,7 @@ def explain_crs_error(error: CRSError) -> str:
 
 
 def horizontal_crs(crs: CRS) -> CRS:
-    """Return the plan component of a CRS.
-
-    A 3D CRS becomes 2D. A CRS that is neither compound nor 3D is returned as it is.
-    """
+    """Return the plan component of a CRS, in 2D; a plain CRS is returned as it is."""
     if crs.is_compound:
         return horizontal_crs(crs.sub_crs_list[0])
     if crs.is_bound and crs.source_crs is not None:
@@ -155,10 +146,7 @@ def names_place(crs: CRS | None) -> bool:
 
 
 def names_heights_alone(crs: CRS) -> bool:
-    """Return whether `crs` has heights but no plan.
-
-    pyproj calls a compound CRS vertical as well.
-    """
+    """Return whether `crs` has heights but no plan: pyproj calls compounds vertical, too."""
     return horizontal_crs(crs).is_vertical
 
 
@@ -183,19 +171,13 @@ def same_horizontal(first: CRS | None, second: CRS | None) -> bool:
 
 @functools.lru_cache(maxsize=64)
 def epsg_code(crs: CRS) -> int | None:
-    """Return the EPSG number of `crs` where pyproj is sure of it, else None.
-
-    It is cached, since looking it up takes a millisecond or several.
-    """
+    """Return the EPSG number where pyproj is sure, else None; cached, as it takes milliseconds."""
     authority = crs.to_authority("EPSG", min_confidence=70)
     return int(authority[1]) if authority else None
 
 
 def combine(horizontal: CRS | None, vertical: CRS | None) -> CRS | None:
-    """Combine a plan and a height system into a compound CRS.
-
-    `horizontal` alone where it has heights already or none are given.
-    """
+    """Return the compound of plan and heights, or `horizontal` that has, or lacks, heights."""
     if horizontal is None or vertical is None or vertical_crs(horizontal) is not None:
         return horizontal
     from pyproj.crs import CompoundCRS
@@ -256,10 +238,7 @@ def height_axis(crs: CRS) -> Any:
 
 
 def find_height_units(heights: CRS, source: str, unit_name: str) -> Units:
-    """Return units of coordinates whose CRS names heights alone.
-
-    The plan's unit has to be that of the heights.
-    """
+    """Return units of a CRS that names heights alone; the plan's has to be the same."""
     units, vertical = NAMED_UNITS[unit_name], heights.axis_info[0]
     check_height_axis(vertical, heights, source)
     if abs(vertical.unit_conversion_factor / units.plan - 1) > 1e-9:
@@ -271,10 +250,7 @@ def find_height_units(heights: CRS, source: str, unit_name: str) -> Units:
 
 
 def find_named_units(name: str | None, alternative: Units = METRES) -> Units:
-    """Return the units of the CRS that a file names by URN or address.
-
-    Returns `alternative` where the file names none that is known.
-    """
+    """Return the units of the CRS named by URN or address, else the `alternative`."""
     try:
         crs = parse_crs(name)
     except InputError:
@@ -313,10 +289,7 @@ def describe_crs(crs: CRS | None) -> str:
 
 
 def make_transformer(source: CRS, target: CRS) -> Transformer:
-    """Return the transformer of plans from `source` to `target`, x before y.
-
-    Raises InputError where there is none.
-    """
+    """Return the transformer of plans, x before y; raises InputError where there is none."""
     plans = horizontal_crs(source), horizontal_crs(target)
     try:
         if any(plan.is_geocentric or plan.is_vertical for plan in plans):
@@ -349,10 +322,7 @@ def convert_to_degrees(crs: CRS, xy: np.ndarray) -> np.ndarray:
 
 
 def find_best_transformer(crs: Any, target: Any, **options: Any) -> Any:
-    """Return pyproj's best transformer to `target` that works here.
-
-    Returns None where there is none.
-    """
+    """Return pyproj's best transformer to `target` that works here, None without one."""
     from pyproj.transformer import TransformerGroup
 
     with warnings.catch_warnings():

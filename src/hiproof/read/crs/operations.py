@@ -89,10 +89,7 @@ class Operation:
 
 
 def find_operation(subject: str, source: CRS, target: CRS, place: tuple[float, float]) -> Operation:
-    """Find the operation of `Transformer.from_crs(source, target)` at `place`.
-
-    `place` is x, y in `source`.
-    """
+    """Find the operation of `Transformer.from_crs(source, target)` at x, y in `source`."""
     x, y = (float(value) for value in place)
     return dataclasses.replace(
         operation_at(source.to_string(), target.to_string(), (x, y)), subject=subject
@@ -100,10 +97,7 @@ def find_operation(subject: str, source: CRS, target: CRS, place: tuple[float, f
 
 
 def is_current(operation: Operation) -> bool:
-    """Check whether PROJ still uses this operation.
-
-    It does not where a grid has been installed or removed since.
-    """
+    """Check whether PROJ still uses this operation: grids may have come or gone since."""
     current = operation_at(operation.source, operation.target, operation.place)
     return (current.name, current.accuracy_m) == (operation.name, operation.accuracy_m)
 
@@ -148,8 +142,5 @@ def missing_ways(source: str, target: str, place: tuple[float, float]) -> list:
 
 
 def is_better(accuracy: float, than: float | None) -> bool:
-    """Return whether a stated accuracy (m) is finer than another.
-
-    None and negative ones are unknown.
-    """
+    """Return whether an accuracy (m) is finer than another; None and negatives are unknown."""
     return than is None or 0 <= accuracy < than

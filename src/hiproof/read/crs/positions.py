@@ -25,20 +25,14 @@ AREA_MARGIN = 2.0
 
 
 def reproject_positions(xy: np.ndarray, source: CRS | None, target: CRS | None) -> np.ndarray:
-    """Reproject positions (n, 2) from `source` to `target`.
-
-    They stay as they are where the two are one or either is unknown.
-    """
+    """Reproject positions (n, 2), unless the two are one or either is unknown."""
     transformer = None if source is None or target is None else find_transformer(source, target)
     return xy if transformer is None else np.column_stack(transformer.transform(*xy.T))
 
 
 @functools.lru_cache(maxsize=8)
 def find_transformer(source: CRS, target: CRS) -> Transformer | None:
-    """Return the cached transformer from `source` to `target`.
-
-    It is None where the two are the same or PROJ knows no way. Choosing one takes long.
-    """
+    """Return the cached transformer, slow to choose, None for one CRS or no known way."""
     if same_horizontal(source, target) or not (names_place(source) and names_place(target)):
         return None
     try:
@@ -48,10 +42,7 @@ def find_transformer(source: CRS, target: CRS) -> Transformer | None:
 
 
 def refuse_degrees(boxes: np.ndarray, subject: str, advice: str) -> None:
-    """Raise InputError where `boxes` (n, 4) without a CRS look like degrees.
-
-    Bounds of an empty one are NaN.
-    """
+    """Raise InputError where `boxes` (n, 4), NaN if empty, without a CRS look like degrees."""
     boxes = boxes[np.isfinite(boxes).all(axis=1)]
     lower, upper = boxes[:, :2], boxes[:, 2:]
     degrees = (np.abs(boxes) <= (180, 90, 180, 90)).all()
@@ -63,10 +54,7 @@ def refuse_degrees(boxes: np.ndarray, subject: str, advice: str) -> None:
 
 
 def doubtful_place(crs: CRS, xy: np.ndarray) -> str | None:
-    """Describe where positions (n, 2) lie if their CRS is not made for it.
-
-    Returns None where the place is inside the area of `crs`.
-    """
+    """Say where positions (n, 2) lie outside the area of `crs`, None if they do not."""
     area = horizontal_crs(crs).area_of_use
     if area is None or area.west > area.east:
         return None
@@ -81,10 +69,7 @@ def doubtful_place(crs: CRS, xy: np.ndarray) -> str | None:
 
 
 def stretch(crs: CRS, xy: np.ndarray) -> float:
-    """Return how many metres of `crs` a metre on the ground is.
-
-    It is taken at positions (n, 2), in the worse direction, and 1 where unknown.
-    """
+    """Return how many metres of `crs` a metre is at (n, 2), the worse way, 1 if unknown."""
     plan = horizontal_crs(crs)
     lon, lat = np.median(convert_to_degrees(crs, xy), axis=0)
     if not (plan.is_projected and np.isfinite((lon, lat)).all()):

@@ -170,10 +170,7 @@ def documents(path: Path, damaged: Damaged = refuse) -> Iterator[tuple[dict[str,
 
 
 def parsed_line(line: str, place: str, seen_header: bool) -> dict[str, Any]:
-    """Read a line of CityJSONSeq.
-
-    Raises InputError unless it is a header, or a feature after one.
-    """
+    """Read a line of CityJSONSeq; InputError for anything but a header and then features."""
     document = parse_object(line, place)
     kind = document.get("type")
     if kind != "CityJSON" and not (seen_header and kind == "CityJSONFeature"):

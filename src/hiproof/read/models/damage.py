@@ -30,10 +30,7 @@ def refuse(error: InputError) -> None:
 
 
 class SkippedBuildings:
-    """Counts and reports a file's damaged buildings, the first few in full.
-
-    These are the first MOST_TOLD.
-    """
+    """Counts a file's damaged buildings, and reports the first MOST_TOLD in full."""
 
     def __init__(self) -> None:
         self.count = 0
@@ -44,10 +41,7 @@ class SkippedBuildings:
             LOGGER.warning("left out: %s", error)
 
     def iterate_sound(self, buildings: Iterator[T]) -> Iterator[T]:
-        """Yield the `buildings` that could be read.
-
-        Raises InputError where damage left none of them.
-        """
+        """Yield the `buildings` that could be read; raises InputError where there are none."""
         is_empty = True
         for building in buildings:
             is_empty = False

@@ -95,10 +95,7 @@ def number_solids(name: str, solids: list[Solid]) -> Iterator[tuple[str, Solid]]
 
 
 def cityjson_solids(path: Path, damaged: Damaged = refuse) -> Iterator[tuple[str, Solid]]:
-    """Yield the shells of a CityJSON 1.x or 2.0 file, or of CityJSONSeq.
-
-    A line without a transform has that of the line before.
-    """
+    """Yield shells of CityJSON 1.x, 2.0 or Seq; a line lacks no transform of one before."""
     for feature in features(path, damaged=damaged):
         for name, city_object in feature.objects.items():
             try:
@@ -119,10 +116,7 @@ def cityjson_solids(path: Path, damaged: Damaged = refuse) -> Iterator[tuple[str
 
 
 def geometry_shells(geometry: dict[str, Any], vertices: np.ndarray) -> list[Solid]:
-    """Return the shells of one CityJSON geometry.
-
-    Points, lines and templates have none.
-    """
+    """Return the shells of a CityJSON geometry; points, lines and templates have none."""
     kind, boundaries = geometry.get("type"), geometry.get("boundaries", [])
     semantics = geometry.get("semantics") or {}
     surfaces, values = semantics.get("surfaces", []), semantics.get("values")
@@ -143,10 +137,7 @@ def geometry_shells(geometry: dict[str, Any], vertices: np.ndarray) -> list[Soli
 def shell_solid(
     shell: Any, values: Any, surfaces: Any, vertices: np.ndarray, inward: bool = False
 ) -> Solid:
-    """Return one shell with its semantics, on the vertices it uses.
-
-    A shell is faces of rings of indices.
-    """
+    """Return a shell, faces of rings of indices, with semantics, on the vertices it uses."""
     faces = tuple(
         Face(tuple(ring[::-1] if inward else ring for ring in surface.rings), surface.kind)
         for surface in read_shell(shell, values, surfaces, len(vertices))
@@ -208,10 +199,7 @@ def citygml_solids(
 
 
 def find_citygml_crs(path: Path) -> str | None:
-    """Find the name of the CRS of a CityGML file.
-
-    It is that of its first envelope; None where there is none before the first city object.
-    """
+    """Return the CRS's name in a CityGML file's first envelope, None before the first object."""
     from lxml import etree
 
     try:
@@ -232,10 +220,7 @@ def gml_id(element: Any) -> str | None:
 
 
 def member_solids(member: Any, path: Path, without: str) -> Iterator[tuple[str, Solid]]:
-    """Yield the shells of one cityObjectMember.
-
-    A building, each of its parts and each installation with a solid have their own id.
-    """
+    """Yield shells of a cityObjectMember; parts and installations with solids have own ids."""
     polygons = {
         gml_id(element): element for element in member.iter() if local_name(element) == "Polygon"
     }
@@ -256,10 +241,7 @@ def member_solids(member: Any, path: Path, without: str) -> Iterator[tuple[str, 
 
 
 def is_loose(element: Any) -> bool:
-    """Return whether an element is a polygon of a boundary surface.
-
-    Footprints and roof edges (LoD 0) do not count.
-    """
+    """Return whether an element is a polygon of a boundary surface, and not of LoD 0."""
     if local_name(element) != "Polygon" or surface_kind(element, None) is None:
         return False
     return not any(local_name(ancestor).startswith("lod0") for ancestor in element.iterancestors())
@@ -282,10 +264,7 @@ def surface_kind(polygon: Any, default: str | None) -> str | None:
 
 
 def gml_shells(solid: Any, polygons: dict[str | None, Any], place: str) -> list[Solid]:
-    """Return the shells of a gml:Solid, its surfaces by value or by xlink.
-
-    These are the exterior and the interior shells.
-    """
+    """Return outer and inner shells of a gml:Solid, surfaces by value or by xlink."""
     shells = []
     for boundary in solid:
         if local_name(boundary) not in ("exterior", "interior"):
@@ -307,10 +286,7 @@ def gml_shells(solid: Any, polygons: dict[str | None, Any], place: str) -> list[
 
 
 def polygons_solid(polygons: list[Any], place: str, inward: bool = False) -> Solid:
-    """Return one shell of gml:Polygons; equal coordinates become one vertex.
-
-    A ring that is not closed is noted as defect 103.
-    """
+    """Return a shell of gml:Polygons with equal corners joined; open rings are defect 103."""
     number: dict[tuple[float, ...], int] = {}
     faces: list[Face] = []
     defects: list[tuple[int, int]] = []

@@ -67,10 +67,7 @@ def read_table(
 
 
 def table_crs(source: str) -> str | None:
-    """Return the reference system of a source's table, without reading its rows.
-
-    Raises InputError as `read_table` does.
-    """
+    """Return a table's CRS without reading its rows; raises InputError as `read_table`."""
     with open_source(source) as table:
         return find_crs(table.srids(), table.name)
 
@@ -95,10 +92,7 @@ class DatabaseTable:
     where: str | None
 
     def query(self, text: str, columns: Sequence[str] = ()) -> None:
-        """Run `text` with {g}, {c} and {t} filled in.
-
-        They stand for the geometry column, other `columns` and the table.
-        """
+        """Run `text` with {g}, {c} and {t}: the geometry column, other `columns`, the table."""
         from psycopg import sql
 
         others = sql.SQL(", ").join(sql.Identifier("t", name) for name in columns)
@@ -111,10 +105,7 @@ class DatabaseTable:
         self.cursor.execute(sql.SQL(text).format(t=table, **names), binary=True)
 
     def rows(self) -> Iterator[tuple]:
-        """Yield each row's geometry (or None) and attributes.
-
-        Rows are ordered by their content, so that storage does not matter.
-        """
+        """Yield each row's geometry (or None) and attributes, ordered by content."""
         self.query(
             "select ST_AsEWKB(ST_CurveToLine({g})) as ewkb, (select to_jsonb(a) from (select {c}) "
             "a) as attributes from {t} order by 2, 1",
@@ -140,10 +131,7 @@ class DatabaseTable:
 
 @contextmanager
 def open_source(source: str, condition: str | None = None) -> Iterator[DatabaseTable]:
-    """Open the table of a source for the block.
-
-    Errors of the database become InputErrors.
-    """
+    """Open the table of a source for the block; database errors become InputErrors."""
     dsn, table, geometry, where = parse_source(source)
     # each on lines of its own: a comment at its end must not swallow the bracket
     where = f"({where}\n) and ({condition}\n)" if where and condition else where or condition
@@ -165,10 +153,7 @@ def open_source(source: str, condition: str | None = None) -> Iterator[DatabaseT
 
 
 def parse_source(source: str) -> tuple[str, str, str | None, str | None]:
-    """Split a source into dsn, table, geometry column and condition.
-
-    Column and condition may be None.
-    """
+    """Split a source into dsn, table, and, if any, geometry column and condition."""
     try:
         url = urlsplit(refuse_half_a_password(source))
         query = parse_qs(url.query)
@@ -186,10 +171,7 @@ def parse_source(source: str) -> tuple[str, str, str | None, str | None]:
 
 
 def refuse_half_a_password(address: str) -> str:
-    """Return `address`, unless its password ends at a / ? or # of its own.
-
-    The rest of such a password would be taken for a host and shown.
-    """
+    """Return `address`; refuse a password with / ? or #, the rest of which would be shown."""
     remember(address)
     if ADDRESS.match(mask(address)) and not ADDRESS.match(address):
         raise InputError(

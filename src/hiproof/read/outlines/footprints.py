@@ -116,10 +116,7 @@ def meets(polygon: shapely.Polygon, bbox: Box, units: Units) -> bool:
 
 
 def footprint_crs(path: str | Path, layer: str | int | None = None) -> CRS | None:
-    """Return the CRS that a footprint file names, None where it names none.
-
-    Raises InputError as `read_footprints` does.
-    """
+    """Return the CRS that a file names, or None; raises InputError as `read_footprints`."""
     if is_database(path):
         return plan_crs(table_crs(str(path)), path)
     if is_parquet(path):
@@ -132,10 +129,7 @@ def footprint_crs(path: str | Path, layer: str | int | None = None) -> CRS | Non
 
 
 def plan_crs(text: str | CRS | None, path: str | Path) -> CRS | None:
-    """Return the CRS that a vector file names, None if it has no plan.
-
-    GeoPackage's "undefined" is None too.
-    """
+    """Return a vector file's CRS, None without a plan or for GeoPackage's "undefined"."""
     crs = read_named_crs(text, path)
     return None if crs is None or names_heights_alone(crs) or crs.name in UNDEFINED_CRS else crs
 
@@ -177,10 +171,7 @@ def read_file(
     where: str | None,
     make_box: Callable[[Any], Box | None],
 ) -> Features:
-    """Read the features of a file, by its kind.
-
-    `make_box` gives the box to read in the file's CRS.
-    """
+    """Read a file's features by its kind, in the box that `make_box` gives in its CRS."""
     if is_parquet(path):
         from .geoparquet import read_parquet
 
@@ -197,11 +188,7 @@ def refuse_nothing(
     where: str | None,
     bbox: Box | None,
 ) -> None:
-    """Raise InputError where no feature is left.
-
-    `count` is then 0: the layer that lies in `bounds` is empty, or a condition or box lets none
-    through.
-    """
+    """Raise InputError for no features: an empty layer, or a condition or box lets none in."""
     if count:
         return
     if where or bbox:
@@ -229,10 +216,7 @@ def refuse_missing(path: str | Path) -> None:
 
 
 def box_in(crs: CRS | None, bbox: Box, bbox_crs: CRS | None) -> Box:
-    """Return a box in `crs` around all of `bbox`, which is in `bbox_crs`.
-
-    Where either is unknown, the box stays as it is.
-    """
+    """Return a box in `crs` around `bbox` of `bbox_crs`, the same where one is unknown."""
     if crs is None or bbox_crs is None or same_horizontal(crs, bbox_crs):
         return bbox
     if not names_place(crs):
@@ -241,10 +225,7 @@ def box_in(crs: CRS | None, bbox: Box, bbox_crs: CRS | None) -> Box:
 
 
 def attribute_rows(names: list[str], columns: list[np.ndarray], count: int) -> list[dict[str, Any]]:
-    """Return one dictionary of plain Python values a feature.
-
-    Values that are not set (None, NaN) are left out.
-    """
+    """Return a dictionary of plain values a feature, without None and NaN."""
     values = [[plain_value(value) for value in column.tolist()] for column in columns]
     return [
         {
@@ -257,10 +238,7 @@ def attribute_rows(names: list[str], columns: list[np.ndarray], count: int) -> l
 
 
 def plain_value(value: Any) -> Any:
-    """Convert a value to one that JSON has.
-
-    NaN becomes None, dates ISO text, bytes hexadecimal text, arrays lists.
-    """
+    """Convert a value to JSON's: NaN to None, dates and bytes (hex) to text, arrays to lists."""
     if isinstance(value, np.ndarray):
         return value.tolist()
     if isinstance(value, float) and not np.isfinite(value):
@@ -273,10 +251,7 @@ def plain_value(value: Any) -> Any:
 def feature_ids(
     rows: list[dict[str, Any]], numbers: np.ndarray, id_attribute: str | None, path: str | Path
 ) -> list[str]:
-    """Return the id of each feature as text.
-
-    It is that of the requested attribute, of a usual one, or the feature's number.
-    """
+    """Return features' ids as text: of the requested or a usual attribute, else numbers."""
     by_number = [str(number) for number in numbers]
     names = {name.lower(): name for row in rows for name in row}
     if id_attribute is not None:
@@ -315,10 +290,7 @@ def feature_ids(
 
 
 def id_text(value: Any) -> str:
-    """Return an id as text, empty where there is none.
-
-    Whole numbers that a format stores as floats lose their decimal point.
-    """
+    """Return an id as text, empty without one, floats that are whole without the point."""
     if value is None or not str(value).strip():
         return ""
     return str(int(value)) if isinstance(value, float) and value.is_integer() else str(value)
@@ -327,10 +299,7 @@ def id_text(value: Any) -> str:
 def transform_geometries(
     geometries: np.ndarray, source: CRS | None, target: CRS | None, path: str | Path
 ) -> np.ndarray:
-    """Transform geometries in plan to the target CRS.
-
-    Raises InputError where that is impossible or leads to no numbers.
-    """
+    """Transform plan geometries; raises InputError where impossible or without numbers."""
     geometries = shapely.force_2d(geometries)
     if source is None or not source.is_geographic:
         advice = "name their CRS in the file (`ogr2ogr -a_srs EPSG:4326`), or reproject them"
@@ -371,10 +340,7 @@ def compare_units(source: CRS, target: CRS) -> float:
 
 
 def find_middle(geometries: np.ndarray) -> tuple[float, float]:
-    """Return the middle (x, y) of the geometries, by the medians of their boxes.
-
-    (0, 0) where none has any.
-    """
+    """Return the middle (x, y) of geometries' boxes by medians, (0, 0) without any."""
     boxes = shapely.bounds(geometries)
     boxes = boxes[np.isfinite(boxes).all(axis=1)]
     x, y = np.median((boxes[:, :2] + boxes[:, 2:]) / 2, axis=0) if len(boxes) else (0.0, 0.0)
@@ -398,10 +364,7 @@ def split_features(
     attributes: list[dict[str, Any]],
     path: str | Path,
 ) -> list[Footprint]:
-    """Make footprints of features, several of one whose polygons stand apart.
-
-    `surfaces` (n,) are faces of one body each.
-    """
+    """Make footprints of features, several where polygons stand apart; `surfaces` do not."""
     footprints, mended, empty, split = [], 0, 0, []
     invalid = ~(shapely.is_valid(geometries) | shapely.is_missing(geometries) | surfaces)
     for id, geometry, is_one, row, was_invalid in zip(
@@ -442,10 +405,7 @@ def split_features(
 
 
 def unique_ids(footprints: Sequence[Footprint], path: str | Path) -> list[Footprint]:
-    """Make ids unique by a suffix `_2`, `_3`.
-
-    A copy of an earlier polygon names it in its attribute `copy_of`.
-    """
+    """Make ids unique by `_2`, `_3`; copies of a polygon name it in `copy_of`."""
     ids = {footprint.id for footprint in footprints}
     in_use: set[str] = set()
     result: list[Footprint] = []
@@ -497,10 +457,7 @@ def find_copies(polygons: np.ndarray) -> dict[int, int]:
 
 
 def warn_overlaps(footprints: Sequence[Footprint], path: str | Path) -> None:
-    """Warn once of footprints that lie on larger ones.
-
-    Each gets a model of the same points, and the models overlap.
-    """
+    """Warn once of footprints on larger ones, whose models of the same points overlap."""
     polygons = np.array([footprint.polygon for footprint in footprints])
     pairs = shapely.STRtree(polygons).query(shapely.point_on_surface(polygons), predicate="within")
     pairs = pairs[:, pairs[0] != pairs[1]]

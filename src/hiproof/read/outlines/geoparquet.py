@@ -76,10 +76,7 @@ def read_parquet(
 
 
 def convert_values(column: Any) -> np.ndarray:
-    """Return plain values (n,) of a column, None where a row has none.
-
-    Lists and fields of fields become JSON text.
-    """
+    """Return plain values (n,) of a column, or None; lists and structs become JSON text."""
     from pyarrow import types
 
     values = np.empty(len(column), object)
@@ -106,10 +103,7 @@ def convert_values(column: Any) -> np.ndarray:
 
 
 def select_rows(table: Any, where: str, path: str | Path) -> np.ndarray:
-    """Return the numbers of the rows of `table` that meet a condition in SQL.
-
-    SQLite evaluates the condition.
-    """
+    """Return the numbers of the rows of `table` that meet a condition in SQL (by SQLite)."""
     import pyarrow
 
     known = {name: plain_column(table.column(name)) for name in table.column_names}
@@ -203,11 +197,7 @@ def is_parquet(path: str | Path) -> bool:
 
 @contextmanager
 def open_parquet(path: str | Path) -> Iterator[Any]:
-    """Yield pyarrow's ParquetFile of a path or an address.
-
-    Raises InputError for what cannot be opened, and for whatever goes wrong in the block while it
-    is read.
-    """
+    """Yield pyarrow's ParquetFile; raises InputError for what goes wrong, in the block, too."""
     parquet = import_pyarrow()
     if is_url(path):
         import_fsspec()
@@ -226,10 +216,7 @@ def open_parquet(path: str | Path) -> Iterator[Any]:
 
 
 def geometry_column(file: Any, path: str | Path) -> GeometryColumn:
-    """Return the main geometry column of an open file.
-
-    Raises InputError where it has none of a known kind.
-    """
+    """Return the main geometry column; raises InputError for none of a known kind."""
     try:
         geo = json.loads((file.metadata.metadata or {})[b"geo"])
         name = geo["primary_column"]
@@ -257,11 +244,7 @@ def geometry_column(file: Any, path: str | Path) -> GeometryColumn:
 
 
 def sides_of_rows(told: dict[str, Any], schema: Any) -> tuple[tuple[str, ...], ...] | None:
-    """Return the columns that hold the rows' boxes.
-
-    They are those that the metadata name, else the fields of a column `bbox`, as files before
-    version 1.1 have it.
-    """
+    """Return columns of rows' boxes by metadata, else of `bbox` as before version 1.1."""
     from pyarrow import types
 
     covering = (told.get("covering") or {}).get("bbox")
@@ -303,10 +286,7 @@ def read_rows(
 
 
 def groups_meeting(file: Any, column: GeometryColumn, extent: shapely.Geometry | None) -> list[int]:
-    """Return the row groups that may hold rows in `extent`.
-
-    The file's statistics of the boxes decide.
-    """
+    """Return the row groups that may hold rows in `extent`, by statistics of the boxes."""
     groups = list(range(file.num_row_groups))
     if extent is None or column.sides is None:
         return groups
@@ -340,10 +320,7 @@ def rows_meeting(table: Any, column: GeometryColumn, extent: shapely.Geometry | 
 
 
 def numbers_at(table: Any, way: Sequence[str]) -> np.ndarray:
-    """Return the numbers (n,) of the column to which the names of `way` lead.
-
-    They are NaN where a row has none.
-    """
+    """Return the numbers (n,) of the column at the names of `way`, NaN without."""
     import pyarrow.compute
 
     values = table.column(way[0])

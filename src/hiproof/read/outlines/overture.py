@@ -57,10 +57,7 @@ class Document:
 
 
 def read_document(address: str) -> Document:
-    """Read the document at an address or a path.
-
-    Raises InputError where none can be read there.
-    """
+    """Read the document at an address or path; raises InputError where there is none."""
     fsspec = import_fsspec()
     for left in reversed(range(TRIES)):
         try:
@@ -87,10 +84,7 @@ def unreadable(address: str, error: Exception) -> InputError:
 
 
 def items_meeting(collection: Document, extent: shapely.Geometry) -> list[Document]:
-    """Return the items of a collection whose boxes meet `extent`, by their ids.
-
-    `extent` is in longitude and latitude.
-    """
+    """Return a collection's items, by id, whose boxes meet `extent` (longitude, latitude)."""
     with ThreadPoolExecutor(AT_ONCE) as pool:
         items = list(pool.map(read_document, collection.links("item")))
     met = [item for item in items if meets(item.content.get("bbox"), extent)]
@@ -98,10 +92,7 @@ def items_meeting(collection: Document, extent: shapely.Geometry) -> list[Docume
 
 
 def meets(box: Sequence[float] | None, extent: shapely.Geometry) -> bool:
-    """Return whether a box of an item meets `extent`.
-
-    It has two or three dimensions. An item without a box meets any.
-    """
+    """Return whether an item's box (2D or 3D) meets `extent`; without one it does."""
     if not box:
         return True
     half = len(box) // 2
@@ -191,10 +182,7 @@ def read_overture(
 
 
 def find_collection(catalogue: str, kind: str) -> tuple[str, Document]:
-    """Return a catalogue's release and its collection of a type.
-
-    The release is the one that the catalogue names as its latest, or the catalogue itself.
-    """
+    """Return the latest release a catalogue names, or itself, and its collection of a type."""
     document = read_document(catalogue)
     if THEME not in document.children():
         releases = document.children()
@@ -205,10 +193,7 @@ def find_collection(catalogue: str, kind: str) -> tuple[str, Document]:
 
 
 def find_child(document: Document, name: str) -> Document:
-    """Return the child of a document in the folder `name`.
-
-    Raises InputError where there is none.
-    """
+    """Return a document's child in the folder `name`; raises InputError without one."""
     children = document.children()
     if name not in children:
         raise InputError(
@@ -249,10 +234,7 @@ def joined(tables: list[Any]) -> Any:
 
 
 def summarise_sources(table: Any) -> list[dict[str, Any]]:
-    """Count the rows of each data set from which a table comes.
-
-    Licences are given where the release names them.
-    """
+    """Count a table's rows by data set, with licences where the release names them."""
     counts: Counter[tuple[str, str | None]] = Counter()
     for sources in table.column("sources").to_pylist():
         found = {(str(one.get("dataset")), one.get("license")) for one in sources or ()}

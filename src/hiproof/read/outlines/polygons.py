@@ -50,10 +50,7 @@ def simple_polygons(
 
 
 def is_surface(geometry: shapely.Geometry | None) -> bool:
-    """Return whether the polygons of a geometry are faces in space.
-
-    There are several then, not all at one height.
-    """
+    """Return whether a geometry has several polygons that do not lie at one height."""
     if (
         geometry is None
         or not shapely.has_z(geometry)
@@ -75,10 +72,7 @@ def overlap(polygons: list[shapely.Polygon]) -> bool:
 
 
 def unite_polygons(polygons: list[shapely.Polygon]) -> list[shapely.Polygon]:
-    """Return the union of polygons without hairline gaps.
-
-    Rounding leaves such gaps between faces.
-    """
+    """Return the union of polygons without the hairline gaps that rounding leaves."""
     whole = shapely.simplify(shapely.union_all(polygons, grid_size=JOIN_M), JOIN_M)
     parts = [part for part in polygons_in(whole) if part.area > SLIVER_M2]
     return [
@@ -91,10 +85,7 @@ def unite_polygons(polygons: list[shapely.Polygon]) -> list[shapely.Polygon]:
 
 
 def polygons_in(geometry: shapely.Geometry | None) -> list[shapely.Polygon]:
-    """Return the polygons of a geometry, those of collections one by one.
-
-    Points and lines are left out.
-    """
+    """Return the polygons of a geometry and its collections, without points and lines."""
     if geometry is None:
         return []
     parts = shapely.get_parts(geometry)
@@ -127,10 +118,7 @@ def repair_polygon(polygon: shapely.Polygon) -> list[shapely.Polygon]:
 
 
 def is_buildings_size(polygon: shapely.Polygon) -> bool:
-    """Return whether all coordinates can be those of one building.
-
-    They are numbers on this Earth, no farther apart than the widest building is wide.
-    """
+    """Return whether all coordinates are on this Earth, no farther apart than buildings."""
     xy = shapely.get_coordinates(polygon)
     return len(xy) > 0 and bool(
         is_plausible(xy).all() and np.ptp(xy, axis=0).max() <= WIDEST_BUILDING_M
@@ -138,10 +126,7 @@ def is_buildings_size(polygon: shapely.Polygon) -> bool:
 
 
 def meetings(polygon: shapely.Polygon) -> int:
-    """Count the pairs of edges that may cross, by their boxes.
-
-    Neighbours do not count. Counting stops a little above the most that is allowed.
-    """
+    """Count pairs of edges whose boxes meet, without neighbours, to a little over the most."""
     xy, ring = shapely.get_coordinates(shapely.get_rings(polygon), return_index=True)
     edges = shapely.linestrings(np.stack([xy[:-1], xy[1:]], axis=1)[ring[:-1] == ring[1:]])
     tree, count = shapely.STRtree(edges), 0

@@ -78,10 +78,7 @@ def is_readable(path: str, layer: str | int | None, name: str) -> bool:
 
 
 def column_as_text(path: str, layer: str, name: str, numbers: np.ndarray) -> np.ndarray:
-    """Return an attribute (n,) of the features with these numbers as text.
-
-    Bytes that are no UTF-8 become replacement characters.
-    """
+    """Return an attribute (n,) of these features as text, broken UTF-8 replaced."""
     source = virtual_layer(path, layer, text=name)
     try:
         _, _, _, columns = pyogrio.raw.read(
@@ -221,10 +218,7 @@ def vector_file_crs(path: str | Path, layer: str | int | None) -> str | None:
 
 
 def choose_layer(path: str | Path, layer: str | int | None) -> str | int | None:
-    """Return `layer`, or the only layer of a file that holds geometries.
-
-    Raises InputError, listing them, where several do.
-    """
+    """Return `layer`, or the only one with geometries; InputError lists several."""
     if layer is not None:
         return layer
     layer_names = translate_read_errors(lambda: list_layers(str(path)), path)

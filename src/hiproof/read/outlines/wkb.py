@@ -24,10 +24,7 @@ Z_FLAG, M_FLAG, SRID_FLAG = 1 << 31, 1 << 30, 1 << 29
 
 
 def decode_geometries(wkb: np.ndarray) -> np.ndarray:
-    """Return the geometries (n,) of WKB (n,), None where one cannot be read.
-
-    Unclosed rings are closed.
-    """
+    """Return geometries (n,) of WKB (n,), unclosed rings closed, None if unreadable."""
     decoded = np.array(
         [as_polygons(body) if body is not None else None for body in wkb], dtype=object
     )
@@ -64,10 +61,7 @@ def as_polygons(body: bytes) -> bytes:
 
 
 def decode_kind(body: bytes | bytearray, position: int) -> tuple[str, int, int, int]:
-    """Return byte order, kind, dimensions and first byte of the content.
-
-    They are of the geometry at byte `position`.
-    """
+    """Return byte order, kind, dimensions and content's place of the geometry at `position`."""
     order = "<" if body[position] else ">"
     (code,) = struct.unpack_from(f"{order}I", body, position + 1)
     iso, kind = divmod(code & ~(Z_FLAG | M_FLAG | SRID_FLAG), 1000)

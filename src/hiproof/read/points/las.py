@@ -34,10 +34,7 @@ Box = tuple[float, float, float, float]
 def copc_points(
     file: BinaryIO, facts: LasFacts, octree: Octree, box: Box
 ) -> tuple[np.ndarray, Decoded]:
-    """Return the nodes that meet `box`, and the points in all of them.
-
-    `box` is (xmin, ymin, xmax, ymax). The nodes' points follow one another.
-    """
+    """Return nodes that meet `box` (xmin, ymin, xmax, ymax), and their points in order."""
     nodes = find_nodes(facts, octree, box)
     chunks = list(zip(nodes["points"].tolist(), nodes["bytes"].tolist(), strict=True))
     file.seek(0)
@@ -59,10 +56,7 @@ def read_node_bytes(file: BinaryIO, node: np.void) -> bytes:
 
 
 def find_nodes(facts: LasFacts, octree: Octree, box: Box) -> np.ndarray:
-    """Return the nodes that hold points and meet `box` in plan.
-
-    They are in the order in which they stand in the file.
-    """
+    """Return the nodes with points that meet `box` in plan, in the file's order."""
     lower, upper = cubes(facts, octree, octree.nodes)
     meets = (lower[:, :2] <= box[2:]).all(axis=1) & (upper[:, :2] >= box[:2]).all(axis=1)
     result = octree.nodes[meets]
@@ -70,10 +64,7 @@ def find_nodes(facts: LasFacts, octree: Octree, box: Box) -> np.ndarray:
 
 
 def cubes(facts: LasFacts, octree: Octree, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the lower and upper corners (n, 3) of the nodes' cubes.
-
-    Cubes are wider by what rounding may move a point.
-    """
+    """Return corners (n, 3) of nodes' cubes, wider by what rounding may move a point."""
     level, place = nodes["key"][:, :1], nodes["key"][:, 1:]
     side = np.ldexp(2 * octree.half, -level)
     lower = octree.centre - octree.half + place * side
@@ -81,10 +72,7 @@ def cubes(facts: LasFacts, octree: Octree, nodes: np.ndarray) -> tuple[np.ndarra
 
 
 def check_nodes(xyz: np.ndarray, nodes: np.ndarray, facts: LasFacts, octree: Octree) -> None:
-    """Raise Implausible where a node's points leave its cube.
-
-    The nodes' points follow one another in `xyz` (n, 3).
-    """
+    """Raise Implausible where points `xyz` (n, 3), node after node, leave their cubes."""
     if not len(nodes):
         return
     starts = np.cumsum([0, *nodes["points"][:-1]])
@@ -120,10 +108,7 @@ class Decoded(NamedTuple):
 def read_points(
     file: BinaryIO, facts: LasFacts, runs: list[tuple[int, int]], chunk_points: int
 ) -> Iterator[Decoded]:
-    """Yield the points of the `runs`, [first, end), at most `chunk_points` at once.
-
-    Raises what laspy and lazrs raise where a file ends too early or is damaged.
-    """
+    """Yield points of `runs`, [first, end), in chunks; raises as laspy and lazrs."""
     # threads need points in chunks, which files of before 2011 have not
     is_chunked = facts.compressed and struct.unpack_from("<H", facts.laszip)[0] >= 2
     file.seek(0)
@@ -179,20 +164,14 @@ def translate_errors(path: str | Path) -> Iterator[None]:
 
 
 def read_checked_facts(path: str | Path) -> LasFacts:
-    """Return the facts of a header that passed its checks.
-
-    Raises InputError otherwise.
-    """
+    """Return the facts of a header that passed its checks; raises InputError otherwise."""
     with translate_errors(path):
         return facts_at(str(path), None if is_url(path) else Path(path).stat().st_mtime_ns)
 
 
 @functools.lru_cache(maxsize=64)
 def facts_at(path: str, changed: int | None) -> LasFacts:
-    """Return the header's facts, read once a process for each state of a file.
-
-    `changed` is the file's time of change. An indexed file is opened for each of its squares.
-    """
+    """Return a header's facts, read once for each time of change: squares open it again."""
     with open_binary(path) as file:
         return read_facts(file)
 
@@ -258,20 +237,14 @@ def copc_chunk(path: str | Path, box: tuple[float, float, float, float]) -> Chun
 
 
 def drop_withheld(xyz: np.ndarray, points: Decoded) -> Chunk:
-    """Return coordinates (n, 3) and classes without withheld points.
-
-    Withheld points are flagged as deleted.
-    """
+    """Return coordinates (n, 3) and classes without withheld (deleted) points."""
     if not points.is_withheld.any():
         return xyz, points.classes
     return xyz[~points.is_withheld], points.classes[~points.is_withheld]
 
 
 def log_withheld(count: int, path: str | Path) -> None:
-    """Log once how many points of a file were left out as withheld.
-
-    By the chunk, a tile of a country would take a thousand lines.
-    """
+    """Log once, not by the chunk, how many points of a file were withheld."""
     if count:
         warnings.warn(
             f"{path}: {count_things(count, 'point')} flagged as withheld left out", InputWarning

@@ -82,10 +82,7 @@ class GeoKeys:
         return value if isinstance(value, int) else UNDEFINED
 
     def plan(self) -> CRS | None:
-        """Return the CRS of the plan, a local one if only its unit is defined.
-
-        Raises CRSError where even that is not.
-        """
+        """Return the plan's CRS, local if only its unit is known; CRSError without."""
         code, model = self.code(PROJECTED_CRS), self.code(MODEL)
         if code in EPSG_CODES:
             return with_unit(CRS.from_epsg(code), self.plan_unit())
@@ -119,10 +116,7 @@ class GeoKeys:
         return None if code == UNDEFINED else decode_unit(code)
 
     def heights(self) -> CRS | None:
-        """Return the CRS of the heights, None without any.
-
-        Where code and unit disagree the unit counts.
-        """
+        """Return the heights' CRS, or None; where code and unit disagree the unit counts."""
         code, unit = self.code(VERTICAL_CRS), self.code(VERTICAL_UNIT)
         vertical_crs = decode_vertical_crs(code) if code in EPSG_CODES else None
         if unit in (UNDEFINED, USER_DEFINED):
@@ -137,10 +131,7 @@ class GeoKeys:
 
 
 def value_at(place: int, length: int, position: int, doubles: bytes, texts: bytes) -> Any:
-    """Return the value of one entry of a directory.
-
-    It is None where the entry points beyond its record.
-    """
+    """Return a directory entry's value, None where it points beyond its record."""
     if place == 0:
         return position
     if place == DOUBLES and 8 * (position + 1) <= len(doubles):
@@ -188,20 +179,14 @@ def linear_units() -> dict[int, tuple[str, float]]:
 
 
 def decode_unit(code: int) -> tuple[str, float]:
-    """Return the name and length (m) of a unit.
-
-    Raises CRSError for a code that is no unit of length.
-    """
+    """Return the name and length (m) of a unit; raises CRSError for no unit of length."""
     if code not in linear_units():
         raise CRSError(f"a unit of the code {code}, which is no unit of length")
     return linear_units()[code]
 
 
 def with_unit(crs: CRS, unit: tuple[str, float] | None) -> CRS:
-    """Return a projected CRS whose coordinates are in `unit` (name, metres).
-
-    The unit overrides that of the CRS's code.
-    """
+    """Return a projected CRS in `unit` (name, metres) in place of its code's."""
     if unit is None or abs(crs.axis_info[0].unit_conversion_factor / unit[1] - 1) < 1e-9:
         return crs
     name, factor = unit
@@ -263,10 +248,7 @@ def las_crs(records: dict[int, bytes]) -> CRS | UnknownCRS | None:
 
 
 def decode_wkt(content: bytes) -> str:
-    """Decode a record of WKT.
-
-    It is UTF-8 by the standard, and Latin-1 from writers that did not know.
-    """
+    """Decode WKT as UTF-8, the standard, or Latin-1 of writers that did not know."""
     try:
         text = content.decode()
     except UnicodeDecodeError:

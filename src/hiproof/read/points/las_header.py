@@ -31,11 +31,7 @@ NODES = np.dtype([("key", "<i4", 4), ("start", "<u8"), ("bytes", "<i4"), ("point
 
 
 class Octree(NamedTuple):
-    """COPC's octree: its nodes, its centre and its extent.
-
-    `nodes` (n,) hold points and are of NODES, `centre` is (3,), and half the width of the cube
-    around all comes with them.
-    """
+    """COPC's octree: `nodes` (n,) of NODES with points, `centre` (3,), half its width."""
 
     nodes: np.ndarray
     centre: np.ndarray
@@ -75,18 +71,12 @@ class LasFacts:
 
     @property
     def rounding(self) -> np.ndarray:
-        """How far (3,) rounding may put a point outside the bounds.
-
-        Writers take bounds before or after rounding, some to 1 cm.
-        """
+        """How far (3,) rounding may put a point outside bounds: some writers use 1 cm."""
         return 0.01 + self.scales
 
 
 def read_facts(file: BinaryIO) -> LasFacts:
-    """Read the header of an open file, and check all that can be checked.
-
-    Raises Implausible with the reason.
-    """
+    """Read and check the header of an open file; raises Implausible with the reason."""
     size = file.seek(0, 2)
     file.seek(0)
     facts = parse_header(file.read(max(HEADER_BYTES.values())), size)
@@ -174,10 +164,7 @@ def parse_header(head: bytes, size: int) -> LasFacts:
 
 
 def iterate_records(file: BinaryIO, facts: LasFacts) -> Iterator[tuple[tuple[str, int], bytes]]:
-    """Yield variable length records as ((user id, number), content).
-
-    None of them may reach beyond its place.
-    """
+    """Yield records as ((user id, number), content), none beyond its place."""
     far_start, far_count = facts.far_records
     for start, end, count, form in (
         (facts.header_bytes, facts.data_start, facts.records, "<2x16sHH32x"),
@@ -255,10 +242,7 @@ def compressed_points(file: BinaryIO, facts: LasFacts) -> int:
 
 
 def chunk_table(file: BinaryIO, facts: LasFacts) -> list[tuple[int, int]]:
-    """Return (points, bytes) of each chunk.
-
-    The points are the full number where chunks are of one size.
-    """
+    """Return (points, bytes) of each chunk, the full number where all are of one size."""
     file.seek(facts.data_start)
     start, table = facts.data_start + 8, struct.unpack("<q", file.read(8).ljust(8, b"\xff"))[0]
     if table == -1:  # written as a stream: the place stands at the end
@@ -285,19 +269,13 @@ def chunk_table(file: BinaryIO, facts: LasFacts) -> list[tuple[int, int]]:
 
 
 def count_last_chunk(file: BinaryIO, facts: LasFacts, chunks: list[tuple[int, int]]) -> int:
-    """Return the number of points that the last chunk declares.
-
-    It stands after the chunk's first point, since LAS 1.4's formats.
-    """
+    """Return the last chunk's points, as declared after its first point since LAS 1.4."""
     file.seek(facts.data_start + 8 + sum(length for _, length in chunks[:-1]) + facts.point_bytes)
     return struct.unpack("<I", file.read(4).ljust(4, b"\0"))[0]
 
 
 def check_coordinates(facts: LasFacts) -> None:
-    """Check that scales, offsets and bounds belong together.
-
-    Whole numbers of 32 bits must reach the bounds.
-    """
+    """Check that whole numbers of 32 bits, scaled and offset, reach the bounds."""
     if not ((facts.scales > 0) & (facts.scales <= COARSEST_SCALE)).all():
         raise Implausible(
             f"its header has the scales {format_list(facts.scales)}; they must be above 0 and at "
@@ -316,10 +294,7 @@ def check_coordinates(facts: LasFacts) -> None:
 
 
 def with_octree(file: BinaryIO, facts: LasFacts, info: bytes) -> LasFacts:
-    """Return the facts with COPC's octree, once it is checked.
-
-    Its cube holds the bounds, and its nodes hold as many points as the header says.
-    """
+    """Return the facts with the octree, whose cube and points fit bounds and header."""
     if len(info) < 160:
         raise Implausible(f"its COPC record has {len(info)} bytes instead of 160")
     *centre, half, _, page, page_bytes = struct.unpack_from("<5d2Q", info)
@@ -340,10 +315,7 @@ def with_octree(file: BinaryIO, facts: LasFacts, info: bytes) -> LasFacts:
 
 
 def walk_pages(file: BinaryIO, facts: LasFacts, page: int, page_bytes: int) -> np.ndarray:
-    """Return all nodes that hold points.
-
-    Every page is visited once, so the walk ends.
-    """
+    """Return all nodes that hold points, visiting every page once."""
     waiting, visited, result = [(page, page_bytes)], set(), [np.empty(0, NODES)]
     while waiting:
         start, length = waiting.pop()
@@ -394,10 +366,7 @@ def check_points(xyz: np.ndarray, facts: LasFacts) -> tuple[np.ndarray, np.ndarr
 
 
 def check_all_points(lower: np.ndarray, upper: np.ndarray, facts: LasFacts) -> None:
-    """Raise Implausible where all points together fall short of the bounds.
-
-    They reach from `lower` (3,) to `upper` (3,).
-    """
+    """Raise Implausible where points from `lower` to `upper` (3,) fall short of the bounds."""
     if not ((lower <= facts.mins + SHORT) & (upper >= facts.maxs - SHORT)).all():
         raise Implausible(
             f"its points reach from ({format_list(lower)}) to ({format_list(upper)}), its header's "

@@ -52,10 +52,7 @@ def read_lax(path: str | Path) -> RunIndex | None:
 
 
 def parse_index(words: np.ndarray) -> tuple[RunIndex, int]:
-    """Parse the index from a file's words, and count the points in its cells.
-
-    Raises ValueError or IndexError for another file.
-    """
+    """Parse the index, and count its cells' points; ValueError or IndexError if it is none."""
     for place, mark in ((0, b"LASX"), (2, b"LASS"), (4, b"LASQ"), (13, b"LASV")):
         if words[place : place + 1].tobytes() != mark:
             raise ValueError(f"expected {mark.decode()} in its word {place}")
@@ -76,10 +73,7 @@ def parse_index(words: np.ndarray) -> tuple[RunIndex, int]:
 
 
 def cell_box(index: int, root: tuple[np.float32, ...]) -> tuple[float, float, float, float]:
-    """Return the box of a cell, halved in float32 as the writer does.
-
-    It is wider by what float32 cannot tell apart.
-    """
+    """Return a cell's box, halved in float32 as the writer does, and that much wider."""
     level = 0
     while index >= 4**level:
         index -= 4**level

@@ -43,10 +43,7 @@ class PlyLayout:
 
 
 def ply_chunks(path: str | Path, chunk_points: int) -> Iterator[Chunk]:
-    """Yield the vertices of a PLY file.
-
-    Raises InputError for a header or a body that is not one.
-    """
+    """Yield the vertices of a PLY file; raises InputError for a header or body of none."""
     with open_binary(path) as file:
         layout = read_ply_header(file, path)
         refuse_missing_bytes(file, layout, path)
@@ -80,10 +77,7 @@ def record_type(layout: PlyLayout) -> np.dtype:
 def read_vertices(
     file: BinaryIO, layout: PlyLayout, count: int, path: str | Path, read: int
 ) -> np.ndarray:
-    """Read the next `count` vertices as a float64 table.
-
-    Columns are x, y, z and, where there is one, class.
-    """
+    """Read the next `count` vertices (float64): x, y, z and, where there is one, class."""
     if layout.byte_order == "":
         table = parse_rows(file, TextLayout(0, None, layout.columns), count, path, read)
         result = len(table)

@@ -173,10 +173,7 @@ def iter_points(
 
 
 def plausible_chunks(chunks: Iterator[las.Chunk], path: str | Path) -> Iterator[las.Chunk]:
-    """Yield the chunks of a file without points that have no coordinates.
-
-    Raises for points that lie at no possible place.
-    """
+    """Yield chunks without points that lack coordinates; raises for impossible places."""
     dropped = 0
     for xyz, classes in chunks:
         refuse_implausible(xyz, path)
@@ -194,10 +191,7 @@ def plausible_chunks(chunks: Iterator[las.Chunk], path: str | Path) -> Iterator[
 
 
 def as_input_error(error: Exception, path: str | Path) -> InputError:
-    """Turn an exception of reading one file into that file's InputError.
-
-    Where a run reads many files, none may end the others' work.
-    """
+    """Turn an exception of reading a file into its InputError, so that others go on."""
     if isinstance(error, InputError):
         return error
     return InputError(
@@ -220,10 +214,7 @@ def refuse_implausible(xyz: np.ndarray, path: str | Path) -> None:
 
 
 def read_header(path: str | Path) -> PointFileHeader:
-    """Return bounds, count and CRS of one file.
-
-    They come from the header of LAS, LAZ and COPC, and from one pass over text and PLY.
-    """
+    """Return bounds, count and CRS by a header of LAS, LAZ, COPC, or a pass over others."""
     header = las_file_header(path)
     if header is not None:
         return header
@@ -277,10 +268,7 @@ def find_steps(xyz: np.ndarray) -> tuple[float, float]:
 
 
 def warn_coarse(headers: list[PointFileHeader], units: Units) -> None:
-    """Warn once of coordinates in steps larger than COARSE_M.
-
-    Coordinates are in `units`. Roofs are then no finer.
-    """
+    """Warn once of coordinates (in `units`) in steps over COARSE_M, as roofs are no finer."""
     coarse = {}
     for header in headers:
         plan_m, height_m = header.steps[0] * units.plan, header.steps[1] * units.height
@@ -301,10 +289,7 @@ def warn_coarse(headers: list[PointFileHeader], units: Units) -> None:
 
 
 def expand_paths(paths: tuple[str | Path, ...]) -> list[str | Path]:
-    """Return the files that paths, folders and wildcards name, each once.
-
-    They come in the order given; folders are sorted.
-    """
+    """Return the files of paths, (sorted) folders and wildcards, each once, in order."""
     if not paths:
         raise InputError(
             "expected at least one point cloud, got none; name a file, a folder or a wildcard"
@@ -342,10 +327,7 @@ def expand_path(path: str | Path) -> list[str | Path]:
 
 
 def drop_other_text(files: list[Path]) -> list[str | Path]:
-    """Drop the text files of a folder that hold no points.
-
-    A delivery's notes and lists are such files. They stay where there are no others.
-    """
+    """Drop the text files of a folder without points, such as notes, if others are there."""
     points = [
         file
         for file in files
@@ -445,10 +427,7 @@ def common_crs(crs_of: dict[str, Any], arguments: Any = None, unit: str = "auto"
 
 
 def refuse_unknown(crs_of: dict[str, Any]) -> None:
-    """Raise InputError where a file's CRS cannot be understood.
-
-    Its unit might be any.
-    """
+    """Raise InputError where a file's CRS cannot be understood: its unit might be any."""
     for path, crs in crs_of.items():
         if isinstance(crs, UnknownCRS):
             raise InputError(
@@ -458,10 +437,7 @@ def refuse_unknown(crs_of: dict[str, Any]) -> None:
 
 
 def refuse_other_crs(files: list[str | Path], crs: Any, source: str) -> None:
-    """Raise InputError where a file names another CRS than `crs`.
-
-    `source` named `crs`. An unknown CRS goes with any.
-    """
+    """Raise InputError where a file names another CRS than `crs`, which `source` named."""
     for file in files if crs is not None else ():
         header = las_file_header(file)  # text and PLY never name a CRS
         if header is None or isinstance(header.crs, UnknownCRS) or not names_place(header.crs):
@@ -484,10 +460,7 @@ def format_others(paths: list[str]) -> str:
 
 
 def joined_classes(clouds: list[PointCloud]) -> np.ndarray | None:
-    """Return the classes of all clouds one after the other.
-
-    They are 0 (never classified) for a file without any, and None where no file has any.
-    """
+    """Return all clouds' classes, 0 for a file without, None where no file has any."""
     if all(cloud.classification is None for cloud in clouds):
         return None
     return np.concatenate([cloud.classes for cloud in clouds])
@@ -500,10 +473,7 @@ def select_classes(
 
 
 def box_in_file(box: Box, units: Units) -> Box:
-    """Return a box in the file's unit that holds all of `box`.
-
-    It is a little wider where rounding could cut its border off.
-    """
+    """Return a box in the file's unit around `box`, wider where rounding could cut it."""
     if units.are_metres:
         return box
     (xmin, ymin), (xmax, ymax) = units.from_metres(np.reshape(box, (2, 2))) + [[-0.01], [0.01]]

@@ -21,20 +21,14 @@ RUN_POINTS = 50_000
 
 @dataclass(frozen=True)
 class RunIndex:
-    """The boxes of cells, and the runs of points that each cell holds.
-
-    `runs` (r, 2) of points, [first, end), of cells `cell_of` (r,).
-    """
+    """Boxes of cells, and `runs` (r, 2), [first, end), of points of cells `cell_of` (r,)."""
 
     boxes: np.ndarray
     cell_of: np.ndarray
     runs: np.ndarray
 
     def find_runs(self, boxes: np.ndarray) -> np.ndarray:
-        """Return ascending runs (k, 2) that hold every point inside any of `boxes`.
-
-        `boxes` is (m, 4). The runs hold other points too.
-        """
+        """Return ascending runs (k, 2) with all points, and others, inside `boxes` (m, 4)."""
         cells = shapely.STRtree(shapely.box(*self.boxes.T))
         met = np.zeros(len(self.boxes), bool)
         met[cells.query(shapely.box(*boxes.T))[1]] = True
@@ -42,10 +36,7 @@ class RunIndex:
 
 
 def join_runs(runs: np.ndarray) -> np.ndarray:
-    """Join ascending runs (k, 2) that overlap or are close.
-
-    Runs are close where they are less than RUN_POINTS apart.
-    """
+    """Join ascending runs (k, 2) that overlap or are less than RUN_POINTS apart."""
     if not len(runs):
         return runs
     runs = runs[np.argsort(runs[:, 0], kind="stable")]
@@ -70,11 +61,7 @@ def compute_run_boxes(xyz: np.ndarray) -> np.ndarray:
 
 
 def make_index(boxes: np.ndarray, points: int) -> RunIndex | None:
-    """Make the index of a file of so many `points`, in runs of RUN_POINTS.
-
-    The runs lie in `boxes` (k, 4), in their order. Returns None where there are more or fewer boxes
-    than runs.
-    """
+    """Make the index of runs of RUN_POINTS in `boxes` (k, 4); None if their numbers differ."""
     if not len(boxes) == math.ceil(points / RUN_POINTS) > 0:
         return None
     first = np.arange(len(boxes)) * RUN_POINTS

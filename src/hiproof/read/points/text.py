@@ -24,11 +24,7 @@ COMMENTS = ("#", "//")
 
 @dataclass(frozen=True)
 class TextLayout:
-    """The layout of a text file of points.
-
-    It has the lines to skip, the delimiter (None: white space), and the columns of x, y, z (and
-    class).
-    """
+    """A text file of points: lines to skip, delimiter (None: space), columns x, y, z, class."""
 
     skip: int
     delimiter: str | None
@@ -36,10 +32,7 @@ class TextLayout:
 
 
 def text_chunks(path: str | Path, chunk_points: int) -> Iterator[Chunk]:
-    """Yield the points of a text file.
-
-    Raises InputError naming the first line that holds no point.
-    """
+    """Yield the points of a text file; InputError names the first line without one."""
     layout = sniff(path)
     read = 0
     with (
@@ -85,10 +78,7 @@ def read_classes(table: np.ndarray) -> np.ndarray | None:
 
 
 def sniff(path: str | Path) -> TextLayout:
-    """Find the layout from the first lines.
-
-    Raises InputError when they are no text or hold no three numbers.
-    """
+    """Find the layout by the first lines; InputError without text or three numbers."""
     with open_binary(path) as file:
         head = file.read(65536)
     if head.startswith((b"\xff\xfe", b"\xfe\xff")):

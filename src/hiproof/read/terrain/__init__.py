@@ -18,10 +18,7 @@ from .raster import RasterTerrain, import_rasterio
 
 
 class Terrain(Protocol):
-    """Heights of the ground in world coordinates.
-
-    `source` is the text a building's output names it by.
-    """
+    """Heights of the ground in the world; outputs name `source` as theirs."""
 
     @property
     def source(self) -> str: ...

@@ -145,10 +145,7 @@ class RasterTerrain:
         return parse_crs(self.dataset.crs.to_wkt()) if self.dataset.crs else None
 
     def make_transformer(self):
-        """Make the transformer from the coordinates of queries to the raster's.
-
-        None where they are the same in plan, or one is unknown or local.
-        """
+        """Make the transformer from queries to the raster, None for the same, or unknown, plan."""
         own_crs = self.own_crs
         if self.crs is None or own_crs is None or same_horizontal(self.crs, own_crs):
             return None
@@ -186,10 +183,7 @@ class RasterTerrain:
         return tuple(self.dataset.bounds)
 
     def height_at(self, xy_world: np.ndarray) -> np.ndarray:
-        """Return the height (n,) in metres at `xy_world` (n, 2).
-
-        It is NaN outside the raster and where the raster has none.
-        """
+        """Return the height (n,) in m at `xy_world` (n, 2), NaN where the raster has none."""
         row, column, inside = self.pixels_at(xy_world)
         heights = np.full(len(row), np.nan)
         # Bilinear interpolation runs between pixel centres; the outermost half pixel takes its
@@ -200,10 +194,7 @@ class RasterTerrain:
         return heights
 
     def is_coded_at(self, xy_world: np.ndarray) -> np.ndarray:
-        """Return whether (n,) the pixels at `xy_world` (n, 2) hold a code.
-
-        A code is a value that is no height, though the file calls it data.
-        """
+        """Return whether (n,) pixels at `xy_world` (n, 2) hold a code, that is, no height."""
         row, column, inside = self.pixels_at(xy_world)
         coded = np.zeros(len(row), bool)
         column = np.floor(column[inside]).astype(int)
@@ -212,10 +203,7 @@ class RasterTerrain:
         return coded
 
     def take(self, row: np.ndarray, column: np.ndarray) -> np.ndarray:
-        """Return the heights (n,) of pixels, or of the last ones before the raster's end.
-
-        They are NaN without data, and infinite where the stored value is no height.
-        """
+        """Return heights (n,) of pixels within the raster, NaN or infinite as `read_tile`."""
         row = np.minimum(row, self.dataset.height - 1)
         column = np.minimum(column, self.dataset.width - 1)
         places = np.column_stack([row, column])
@@ -227,10 +215,7 @@ class RasterTerrain:
         return result
 
     def pixels_at(self, xy_world: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the rows and columns (n,) at `xy_world` (n, 2) of the raster.
-
-        A third array (n,) tells which of them lie inside.
-        """
+        """Return rows and columns (n,) at `xy_world` (n, 2), and which lie inside."""
         xy = self.units.from_metres(np.asarray(xy_world, float)[:, :2])
         if self.transformer is not None:
             xy = np.column_stack(self.transformer.transform(xy[:, 0], xy[:, 1]))
@@ -261,10 +246,7 @@ class RasterTerrain:
         return bool(np.isfinite(self.height_at(sample)).any())
 
     def read_tile(self, row: int, column: int) -> np.ndarray:
-        """Return the heights (m) of a tile.
-
-        They are NaN without data, and infinite where the stored value is no height.
-        """
+        """Return a tile's heights (m), NaN without data, infinite where they are no height."""
         stored, heights = self.stored_and_heights(row, column)
         is_code = np.isin(stored, NODATA_CODES) & np.isfinite(heights)
         if is_code.any():
@@ -272,11 +254,7 @@ class RasterTerrain:
         return heights
 
     def stored_and_heights(self, row: int, column: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return the stored values of a tile, and their heights in metres.
-
-        Stored values are NaN without data. Heights are infinite where no ground is so low or so
-        high.
-        """
+        """Return a tile's stored values (NaN without data) and heights (infinite if none)."""
         from rasterio.errors import RasterioError
         from rasterio.windows import Window
 
@@ -303,10 +281,7 @@ class RasterTerrain:
 
     @cached_property
     def codes(self) -> tuple[float, ...]:
-        """Those of CODES that are no heights in this raster.
-
-        Pixels hold them that lie far from all others of some tiles.
-        """
+        """Those of CODES that lie far from all other pixels of some tiles, so are no heights."""
         along = [
             np.unique(
                 np.linspace(0, (size - 1) // TILE_PX, SAMPLED_TILES).round().astype(int)
@@ -320,10 +295,7 @@ class RasterTerrain:
 
 
 def is_isolated(heights: np.ndarray, is_coded: np.ndarray) -> bool:
-    """Return whether pixels of one height lie far from nearly all others.
-
-    False where there are no others.
-    """
+    """Return whether pixels of one height lie far from nearly all others, if any."""
     coded = int(is_coded.sum())
     if coded < FEWEST_CODED or coded == len(heights):
         return False
@@ -334,11 +306,7 @@ def is_isolated(heights: np.ndarray, is_coded: np.ndarray) -> bool:
 def bilinear(
     take: Callable[[np.ndarray, np.ndarray], np.ndarray], row: np.ndarray, column: np.ndarray
 ) -> np.ndarray:
-    """Return the weighted mean (n,) of the four pixels around each position.
-
-    `take` returns the pixels of rows and columns. Those that are not finite are left out. It is NaN
-    where all are.
-    """
+    """Return the weighted mean (n,) of four pixels by `take`, of finite ones, or NaN."""
     row0, column0 = np.floor(row).astype(int), np.floor(column).astype(int)
     down, right = row - row0, column - column0
     corners = ((0, 0), (0, 1), (1, 0), (1, 1))

@@ -48,10 +48,7 @@ PICTURE = (
 
 
 def refuse_without_position(dataset: Any, path: str) -> None:
-    """Raise InputError for a raster whose pixels have no position.
-
-    It has no geotransform, or one that maps pixels onto a line.
-    """
+    """Raise InputError without a geotransform, or with one that maps pixels onto a line."""
     transform = dataset.transform
     if transform.is_identity:
         raise InputError(
@@ -102,19 +99,13 @@ def height_band(dataset: Any, path: str) -> int:
 
 
 def alpha_band(dataset: Any) -> int | None:
-    """Return the number of the band of transparency, None without one.
-
-    GDAL takes no notice of it beside heights in decimals.
-    """
+    """Return the band of transparency, or None: GDAL ignores it beside decimals."""
     kinds = [interpretation.name.lower() for interpretation in dataset.colorinterp]
     return kinds.index("alpha") + 1 if "alpha" in kinds[1:] else None
 
 
 def read_scaling(dataset: Any, band: int, path: str) -> tuple[float, float]:
-    """Return the factor and the offset of stored values.
-
-    Raises InputError where they give no height.
-    """
+    """Return factor and offset of stored values; InputError where they give no height."""
     scale, offset = float(dataset.scales[band - 1]), float(dataset.offsets[band - 1])
     if not (math.isfinite(scale) and scale and math.isfinite(offset)):
         raise InputError(
@@ -145,9 +136,6 @@ def band_unit(name: str | None, path: str) -> float | None:
 
 
 def spellings(name: str) -> Iterator[str]:
-    """Yield spellings of a unit's name in small letters.
-
-    They are the whole name, and the name without the datum that follows it.
-    """
+    """Yield a unit's name in small letters, whole and without the datum that follows."""
     for text in (name.lower(), DATUM.sub("", name.lower())):
         yield re.sub(r"[^a-z]", "", text)

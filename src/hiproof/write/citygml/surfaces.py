@@ -22,11 +22,7 @@ ROLES = {ROOF: "roof", WALL: "wall", GROUND: "ground", CEILING: "ceiling"}
 
 
 def surface_ids(faces: tuple[Face, ...], name: str, part: str = "") -> list[str]:
-    """Return an id for each face's polygon, by kind and number.
-
-    That of a building part comes before it; the building's name comes last, so that no two names
-    meet.
-    """
+    """Return ids of faces' polygons by part, kind, number and, last, the building's name."""
     counts = dict.fromkeys(ROLES, 0)
     ids = []
     for face in faces:
@@ -47,10 +43,7 @@ def lod1_solid(solid: Solid | None, units: Units) -> str:
 
 
 def lod2_solid(polygon_ids: list[str], id: str) -> str:
-    """Return the closed shell under its gml:id.
-
-    It is made of the boundary surfaces' own polygons.
-    """
+    """Return the shell of the boundary surfaces' own polygons under its gml:id."""
     members = "".join(
         f'<gml:surfaceMember xlink:href="#poly-{polygon_id}"/>' for polygon_id in polygon_ids
     )
@@ -79,10 +72,7 @@ def surface_members(rings: list[str]) -> str:
 
 
 def terrain_element(lines: list[np.ndarray], level: int) -> str:
-    """Return the lines (m, 3) where the building meets the terrain, as GML.
-
-    They are of that level of detail.
-    """
+    """Return the lines (m, 3) where building and terrain meet, of a level, as GML."""
     members = "".join(
         f"<gml:curveMember><gml:LineString>{position_list(positions(line))}</gml:LineString></gml:curveMember>"
         for line in lines
@@ -126,10 +116,7 @@ def boundary_surfaces(
 
 
 def angle_attributes(figures: RoofFigures, faces: list[int]) -> str:
-    """Return slope and azimuth of a roof surface, as far as they are known.
-
-    `faces` are the numbers of its faces.
-    """
+    """Return known slope and azimuth of a roof surface with these faces."""
     angles = dict(zip(("slope", "azimuth"), measure_angles(figures, faces), strict=True))
     return "".join(
         generic_attribute(key, round_value(angle, 3))
@@ -159,8 +146,5 @@ def position_list(place: list[str]) -> str:
 
 
 def positions(xyz: np.ndarray) -> list[str]:
-    """Return each of the coordinates (n, 3) as text.
-
-    It goes to a ten-thousandth of their unit.
-    """
+    """Return coordinates (n, 3) as text, to a ten-thousandth of their unit."""
     return ["%.4f %.4f %.4f" % (x, y, z) for x, y, z in (np.round(xyz, 4) + 0.0).tolist()]  # noqa: UP031

@@ -149,10 +149,7 @@ writer = CityGMLWriter
 
 
 def fragment(sheet: Sheet) -> Fragment:
-    """Return the cityObjectMember of a building.
-
-    Its gml:ids end in its name; the root's namespaces are taken as declared.
-    """
+    """Return a cityObjectMember with ids that end in its name, namespaces as declared."""
     text = f"<core:cityObjectMember>{building_element(sheet)}</core:cityObjectMember>".encode()
     lines = terrain_lines(sheet)
     if sheet.figures is not None:
@@ -167,10 +164,7 @@ def fragment(sheet: Sheet) -> Fragment:
 
 
 def building_element(sheet: Sheet) -> str:
-    """Return one bldg:Building, its children in the schema's order.
-
-    All its gml:ids end in its name.
-    """
+    """Return one bldg:Building, its children in the schema's order, ids ending in its name."""
     building, figures, name, write = sheet.building, sheet.figures, sheet.gml_name, sheet.head.write
     text = [f'<bldg:Building gml:id="bldg-{name}"><gml:name>{xml_text(building.id)}</gml:name>']
     change, created = sheet.building.change or {}, sheet.head.creation_date
@@ -229,10 +223,7 @@ def installation_elements(sheet: Sheet) -> list[str]:
 
 
 def part_element(sheet: Sheet, number: int, part: PartShape) -> str:
-    """Return one bldg:BuildingPart with its solid.
-
-    Its gml:ids have the part's number before the building's name.
-    """
+    """Return one bldg:BuildingPart with its solid; ids have its number before the name."""
     name, ground = f"{number}-{sheet.gml_name}", find_ground_height(sheet.building, sheet.figures)
     sets = part.attributes.get(f"{OWN}primitives", [])
     text = [f'<bldg:consistsOfBuildingPart><bldg:BuildingPart gml:id="part-{name}">']
@@ -256,10 +247,7 @@ def part_element(sheet: Sheet, number: int, part: PartShape) -> str:
 def format_roof_and_height(
     types: Iterable[str], figures: RoofFigures, z_ground: float, write: WriteSettings
 ) -> str:
-    """Return roofType of roof parts of `types`, and measuredHeight.
-
-    Height is over the ground; roofType is left out without types.
-    """
+    """Return roofType, if any, and measuredHeight over the ground."""
     code = roof_type_code(types, write.roof_codes) if types else None
     roof = (
         ""
@@ -288,10 +276,7 @@ def level_surfaces(sheet: Sheet) -> str:
 
 
 def undo_shift(sheet: Sheet) -> np.ndarray:
-    """Return the solid's vertices (n, 3) as if its footprint had not moved.
-
-    They are in the file's unit.
-    """
+    """Return the solid's vertices (n, 3), footprint unmoved, in the file's unit."""
     return sheet.head.units.gml.from_metres(
         sheet.building.model.on_one_level.vertices - np.array([*sheet.building.shift, 0.0])
     )
@@ -315,10 +300,7 @@ def with_terrain(sheet: Sheet, shell: str, rings: list[str]) -> str:
 
 
 def terrain_lines(sheet: Sheet) -> list[np.ndarray]:
-    """Return the usable lines (m, 3) of the terrain intersection.
-
-    They are in the file's unit, with two points at least, all known.
-    """
+    """Return known terrain lines (m, 3), m > 1, in the file's unit."""
     if not sheet.head.write.terrain_intersection:
         return []
     lines = (
@@ -335,11 +317,7 @@ def in_file(sheet: Sheet, solid: Solid) -> np.ndarray:
 
 
 def choose_solid(sheet: Sheet) -> Solid | None:
-    """Return the solid that is the building's own, or None.
-
-    It is the finest requested. There is none where its parts have solids, or where none is
-    requested.
-    """
+    """Return the finest requested solid, None where none is or its parts have solids."""
     lods = sheet.head.write.lods
     if sheet.figures is None or (sheet.shapes.parts and "2.2" in lods):
         return None

@@ -73,10 +73,7 @@ def fragment(sheet: Sheet) -> Fragment:
 
 
 def upgrade_member(member: Fragment) -> Fragment:
-    """Translate a cityObjectMember of CityGML 2.0 to 3.0.
-
-    The root's namespaces are taken as declared in both.
-    """
+    """Translate a cityObjectMember of CityGML 2.0 to 3.0, namespaces as declared in both."""
     declared = " ".join(f'xmlns:{prefix}="{uri}"' for prefix, uri in version2.NAMESPACES.items())
     old = etree.fromstring(f"<root {declared}>".encode() + member.text + b"</root>", HUGE)
     root = load_translation()(old).getroot()

@@ -24,10 +24,7 @@ LOD_SOLID, LOD_OVERHANGS, LOD_FOOTPRINT = "2.2", "2.3", "0"
 
 
 class Vertices:
-    """The vertices of one feature as integers; equal ones are one.
-
-    A coordinate is integer * scale + origin, in `units`.
-    """
+    """The vertices of one feature, each once, as integers * scale + origin in `units`."""
 
     def __init__(self, origin: np.ndarray, scale: float, units: Units = METRES) -> None:
         self.origin, self.scale, self.units = origin, scale, units
@@ -110,10 +107,7 @@ def part_geometry(
 
 
 def level_surfaces(building: Building, shapes: Shapes, vertices: Vertices) -> list[dict[str, Any]]:
-    """Return LoD0: the unmoved footprint, and the roof's edge.
-
-    Semantics tell them apart.
-    """
+    """Return LoD0, told apart by semantics: the unmoved footprint and the roof's edge."""
     solid = building.model.on_one_level
     corners, grounds = solid.vertices, solid.select_faces(GROUND)
     unmoved = corners - np.array([*building.shift, 0.0]) if any(building.shift) else corners
@@ -204,10 +198,7 @@ def roof_surfaces(
 
 
 def level_footprint(building: Building) -> shapely.Polygon | None:
-    """Return the footprint of a building without a solid, or None.
-
-    It is None without one or without a height at which to draw it.
-    """
+    """Return the footprint without a solid, or None without one or without its height."""
     footprint = building.footprint
     if footprint is None or footprint.is_empty or not math.isfinite(building.z_ground):
         return None
@@ -217,10 +208,7 @@ def level_footprint(building: Building) -> shapely.Polygon | None:
 def outline_boundaries(
     outline: shapely.Geometry, z: float, vertices: Vertices
 ) -> list[list[list[int]]]:
-    """Return surfaces of the polygons of `outline` at height `z`.
-
-    Outer rings are counter-clockwise seen from above.
-    """
+    """Return surfaces of `outline` at height `z`, outer rings counter-clockwise from above."""
     surfaces = []
     for polygon in shapely.get_parts(shapely.normalize(outline)):
         polygon = shapely.geometry.polygon.orient(polygon)

@@ -102,10 +102,7 @@ class CityJSONWriter(BuildingWriter):
             self.high = np.maximum(self.high, extent[3:])
 
     def choose_origin(self, building: Building) -> np.ndarray:
-        """Return the file's offset (3,), set by the first building.
-
-        That is the first that has coordinates.
-        """
+        """Return the file's offset (3,), set by the first building that has coordinates."""
         if self.translate is None:
             corner = first_corner(building)
             if corner is None:
@@ -168,18 +165,12 @@ def fragment(sheet: Sheet) -> Fragment:
 
 
 def choose_offset(corner_xy: np.ndarray) -> np.ndarray:
-    """Return the offset (3,) of a file that starts at `corner_xy` (2,).
-
-    It is in whole thousands, so that it seldom moves.
-    """
+    """Return the offset (3,), in whole thousands, so seldom moved, of a file at (2,)."""
     return np.append(np.floor(np.asarray(corner_xy) / GRID) * GRID, 0.0)
 
 
 def city_objects(sheet: Sheet, vertices: Vertices) -> dict[str, dict[str, Any]]:
-    """Return CityObjects by id: the building and its parts.
-
-    Their vertices go to `vertices`.
-    """
+    """Return CityObjects, building and parts, by id; their vertices go to `vertices`."""
     name, prefix, lods = sheet.name, sheet.head.prefix, sheet.head.write.lods
     finest = sheet.finest if LOD_OVERHANGS in lods and sheet.figures is not None else None
     geometry = building_geometry(
@@ -241,10 +232,7 @@ def compute_extent(vertices: Vertices) -> tuple[float, ...]:
 
 
 def feature_line(sheet: Sheet, vertices: Vertices) -> Fragment:
-    """Return the CityJSONFeature of a building.
-
-    `vertices` are empty, about the file's offset.
-    """
+    """Return a building's CityJSONFeature, `vertices` empty, about the file's offset."""
     objects = city_objects(sheet, vertices)
     feature = {
         "type": "CityJSONFeature",

@@ -28,10 +28,7 @@ ALIGNED = 8  # bytes: what tables of properties ask for, and more than arrays of
 
 
 class GlbDocument:
-    """A glTF document that grows.
-
-    `tables` are its JSON; views and accessors are added by the methods that fill the buffer.
-    """
+    """A glTF document that grows: its JSON in `tables`, its buffer by methods."""
 
     def __init__(self) -> None:
         asset = {"version": "2.0", "generator": "hiproof"}
@@ -48,10 +45,7 @@ class GlbDocument:
         return len(views) - 1
 
     def accessor(self, values: np.ndarray, target: int = VERTICES, **table: Any) -> int:
-        """Append `values`, and return the index of their accessor.
-
-        They are (n,) or (n, k) of float32 or unsigned integers, little-endian.
-        """
+        """Append `values` (n,) or (n, k), float32 or unsigned; returns their accessor's index."""
         accessors = self.tables.setdefault("accessors", [])
         view = self.view(np.ascontiguousarray(values).tobytes(), target=target)
         kind = {
@@ -69,10 +63,7 @@ class GlbDocument:
         )
 
     def to_bytes(self) -> bytes:
-        """Return the whole file: header, JSON chunk, binary chunk.
-
-        Each is padded to four bytes.
-        """
+        """Return the file: header, JSON and binary chunks, padded to four bytes."""
         buffers = {"buffers": [{"byteLength": self.size}]} if self.size else {}
         text = json.dumps(self.tables | buffers, separators=(",", ":"), allow_nan=False).encode()
         text += b" " * (-len(text) % 4)
@@ -114,10 +105,7 @@ class GlbContent:
         self.origin: np.ndarray | None = None
 
     def add(self, model: ViewedModel) -> None:
-        """Add one building.
-
-        It has a primitive for the roofs of each type, its walls and its ground.
-        """
+        """Add one building: primitives of roofs by type, walls and ground."""
         vertices = model.solid.vertices
         if self.origin is None:
             self.origin = np.floor(vertices.min(axis=0))
@@ -159,10 +147,7 @@ def material_table(look: Look) -> dict[str, Any]:
 
 
 def flat_triangles(vertices: np.ndarray, faces: Sequence[Face]) -> tuple[np.ndarray, np.ndarray]:
-    """Return corners and face normals (3 t, 3) of the faces' triangles.
-
-    `vertices` are (n, 3); the result is turned y up.
-    """
+    """Return corners and normals (3 t, 3), y up, of the triangles of faces."""
     corners, normals = [np.empty((0, 3))], [np.empty((0, 3))]
     directions = face_normals(vertices, faces)
     for normal, triangles in zip(

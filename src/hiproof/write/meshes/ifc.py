@@ -305,10 +305,7 @@ class IfcModel:
 
 
 def scale_axes(units: Units) -> tuple[str, dict[str, float]]:
-    """Return the entity that leads from metres to a CRS, and its scales.
-
-    The CRS is in these units.
-    """
+    """Return the entity that leads from metres to a CRS in these units, and its scales."""
     plan, height = 1 / units.plan, 1 / units.height
     if plan == height:
         return "IfcMapConversion", {"Scale": plan}
@@ -316,10 +313,7 @@ def scale_axes(units: Units) -> tuple[str, dict[str, float]]:
 
 
 def crs_name(crs: str) -> str:
-    """Return IFC's name of a CRS.
-
-    It is "EPSG:28992" of the plan where it has a code.
-    """
+    """Return IFC's name of a CRS, "EPSG:28992" of the plan where it has a code."""
     from pyproj import CRS
 
     from ...read.crs import epsg_code, horizontal_crs

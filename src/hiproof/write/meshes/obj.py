@@ -53,10 +53,7 @@ def header(library: str, origin: np.ndarray, crs: str | None) -> str:
 
 
 def building_text(model: ViewedModel, origin: np.ndarray, first: int) -> str:
-    """Return one building's lines.
-
-    `first` is the number of its first vertex in the file.
-    """
+    """Return one building's lines; `first` is its first vertex's number in the file."""
     name, solid = "_".join(model.id.split()) or "_", model.solid
     lines = [f"o {name}"]
     lines += [f"v {x:.4f} {y:.4f} {z:.4f}" for x, y, z in solid.vertices - origin]
@@ -71,10 +68,7 @@ def building_text(model: ViewedModel, origin: np.ndarray, first: int) -> str:
 
 
 def polygons(solid: Solid, face: Face) -> Iterable[Iterable[int]]:
-    """Return the face itself, or its triangles where it has holes.
-
-    OBJ has no way to write holes.
-    """
+    """Return the face, or its triangles where it has holes, which OBJ cannot write."""
     return face.rings if len(face.rings) == 1 else face_triangles(solid.vertices, face)
 
 

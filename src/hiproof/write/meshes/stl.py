@@ -46,10 +46,7 @@ def header(origin: np.ndarray) -> bytes:
 
 
 def solid_triangles(model: ViewedModel, origin: np.ndarray) -> np.ndarray:
-    """Return the triangles (t,) of a model with unit normals.
-
-    They are about `origin` (3,).
-    """
+    """Return the triangles (t,) of a model about `origin` (3,) with unit normals."""
     solid = model.solid
     triangles = np.concatenate(faces_triangles(solid.vertices, solid.faces))
     corners = (solid.vertices - origin)[triangles]

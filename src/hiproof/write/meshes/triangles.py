@@ -62,10 +62,7 @@ def is_triangle(face: Face) -> bool:
 def cut_faces(
     vertices: np.ndarray, faces: Sequence[Sequence[Sequence[int]]], normals: np.ndarray
 ) -> list[np.ndarray]:
-    """Return triangles (t, 3) of faces, by constrained Delaunay.
-
-    Faces are given by their rings of vertex indices and their normals (n, 3).
-    """
+    """Return triangles (t, 3) of faces of rings, with normals (n, 3), by constrained Delaunay."""
     # Dropping the axis of the largest normal component keeps the plan's coordinates exact, so they
     # name their vertex.
     axes = np.abs(normals).argmax(axis=1)
@@ -92,10 +89,7 @@ def cut_faces(
 
 
 def number_corners(corners: np.ndarray, plan: np.ndarray, indices: Sequence[int]) -> np.ndarray:
-    """Return vertex indices (t, 3) of triangles' corners (t, 3, 2).
-
-    Corners are among the vertices `plan` (m, 2) with these `indices`.
-    """
+    """Return indices (t, 3) of corners (t, 3, 2) among vertices `plan` (m, 2), `indices`."""
     index_at = dict(zip(map(tuple, plan.tolist()), indices, strict=True))
     return np.array([index_at[tuple(xy)] for xy in corners.reshape(-1, 2).tolist()], int).reshape(
         -1, 3
@@ -117,10 +111,7 @@ class PageMesh:
 
 
 def solid_mesh(solid: Solid) -> PageMesh:
-    """Return the mesh of a solid, in its own frame.
-
-    Faces on the ground are left out.
-    """
+    """Return a solid's mesh in its own frame, without faces on the ground."""
     corners, part, edges = [np.empty((0, 3, 3))], [], [np.empty((0, 2, 3))]
     numbers = [k for k, face in enumerate(solid.faces) if face.kind in (ROOF, WALL)]
     faces, face_of = [solid.faces[k] for k in numbers], []

@@ -22,11 +22,7 @@ class Look(NamedTuple):
 
 
 class ViewedModel(NamedTuple):
-    """A building with its solid in world metres.
-
-    `part_types` are the roof types of its parts by number (`Face.part`), `roof_type` is that of the
-    largest.
-    """
+    """A building's solid in world metres; `part_types` are roof types by `Face.part`."""
 
     id: str
     roof_type: str
@@ -72,10 +68,7 @@ def view_building(
 
 
 def parameters_text(building: Building) -> str:
-    """Return the parts of a roof as JSON, without outlines.
-
-    It is empty where none has parameters.
-    """
+    """Return the parts of a roof as JSON without outlines, empty without parameters."""
     records = [part_record(part) for part in building.parts]
     if not any(record["parameters"] or record["type"] == "free" for record in records):
         return ""

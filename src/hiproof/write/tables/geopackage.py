@@ -59,10 +59,7 @@ def write_attributes(
 
 
 def attributes_with_a_column() -> int:
-    """Return how many input attributes a table of buildings has room for.
-
-    They stand beside hiproof's own.
-    """
+    """Return how many input attributes a table of buildings holds beside hiproof's own."""
     return MOST_COLUMNS - sum(len(TABLES[name].names) for name in ("roofer", "hiproof", "osm")) - 1
 
 

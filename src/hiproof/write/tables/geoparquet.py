@@ -21,10 +21,7 @@ GEOMETRY_TYPES = {BUILDINGS: PLAN_TYPES, "parts": PLAN_TYPES, "roof_surfaces": [
 
 
 class GeoParquetWriter(AttributesWriter):
-    """Incremental writer of the rows of the GeoPackage's `layer`.
-
-    Raises InputError where pyarrow is missing.
-    """
+    """Writer of the rows of the GeoPackage's `layer`; raises InputError without pyarrow."""
 
     reserved = (*AttributesWriter.reserved, GEOMETRY)
 
@@ -46,10 +43,7 @@ class GeoParquetWriter(AttributesWriter):
                 )
 
     def schema(self, kinds: dict[str, type]) -> Any:
-        """Return Arrow's schema of the columns `kinds` and the geometry.
-
-        It has GeoParquet's description of the latter.
-        """
+        """Return Arrow's schema of `kinds` and the geometry, which GeoParquet describes."""
         import pyarrow
         from pyproj import CRS
 

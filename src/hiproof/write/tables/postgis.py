@@ -180,10 +180,7 @@ class Loading:
         return count
 
     def refuse_other_runs(self) -> None:
-        """Raise OutputError where the tables hold a run that would be lost.
-
-        A run of this name from another folder counts too.
-        """
+        """Raise OutputError where tables hold other runs, or this name from elsewhere."""
         if self.run.replace or not self.table_exists("buildings"):
             return
         others = self.list_runs()
@@ -203,10 +200,7 @@ class Loading:
         )
 
     def list_runs(self) -> list[tuple[str, str]]:
-        """Return (name, folder) of every run in the tables.
-
-        Those that no load noted have one without a name.
-        """
+        """Return (name, folder) of every run in the tables, None as that of unnoted ones."""
         if not self.table_exists("runs"):
             return [("without a name", "another program")]
         self.cursor.execute(f"select run, folder from {self.name('runs')} order by run")
@@ -242,10 +236,7 @@ class Loading:
             self.cursor.execute(f"create index {name}_type on {name} (type)")
 
     def widen_table(self, table: PostgisTable, columns: dict[str, type]) -> dict[str, type]:
-        """Remove this run's rows, and add the columns that a table lacks.
-
-        Columns of two types get one. Returns the columns as the table has them.
-        """
+        """Remove this run's rows and add missing columns; returns them with the table's types."""
         name = self.name(table.ending)
         self.cursor.execute(f"delete from {name} where run = %s", (self.run.name,))
         self.settle_srid(table, name)
@@ -272,10 +263,7 @@ class Loading:
         return columns
 
     def settle_srid(self, table: PostgisTable, name: str) -> None:
-        """Give the run's reference system to an empty table.
-
-        Raises OutputError for one that holds runs in another.
-        """
+        """Give the run's CRS to an empty table; OutputError for one with runs in another."""
         self.cursor.execute("select Find_SRID(current_schema()::text, %s, 'geom')", (name,))
         (srid,) = self.cursor.fetchone()
         if srid == self.run.srid:
@@ -304,10 +292,7 @@ class Loading:
         kinds: dict[str, type],
         columns: dict[str, type],
     ) -> None:
-        """Send the rows to a table.
-
-        `kinds` are their values by name, `columns` those of the table in the same order.
-        """
+        """Send rows, `kinds` their values by name, to the table's `columns` in that order."""
         names = ", ".join(map(quote, ("run", *columns, "geom")))
         with self.cursor.copy(f"copy {self.name(table.ending)} ({names}) from stdin") as copy:
             for batch in rows.batches():
@@ -350,10 +335,7 @@ def collect_rows(
 
 
 def database_rows(described: Described, units: FileUnits) -> Rows:
-    """Return a building's rows as in the GeoPackage, with its solid.
-
-    It takes the place of the outline.
-    """
+    """Return a building's rows as in the GeoPackage, its solid in place of the outline."""
     building, figures, attributes = described
     rows = table_rows(building, figures, attributes, units.table)
     solid = None if building.built is None else polyhedral_wkb(building.solid, units.table)
@@ -361,10 +343,7 @@ def database_rows(described: Described, units: FileUnits) -> Rows:
 
 
 def polyhedral_wkb(solid: Solid, units: Units) -> bytes:
-    """Return the shell as triangles over the solid's own vertices.
-
-    So neighbours stay joined.
-    """
+    """Return the shell as triangles over its own vertices, so that neighbours stay joined."""
     places = np.round(units.from_metres(solid.vertices), 4)
     triangles = np.concatenate(faces_triangles(solid.vertices, solid.faces))
     rows = np.zeros(len(triangles), TRIANGLE_WKB)
@@ -385,10 +364,7 @@ TRIANGLE_WKB = np.dtype(
 
 
 def encode_place(wkb: bytes, srid: int) -> str:
-    """Return little-endian WKB as hexadecimal EWKB of a reference system.
-
-    A polygon in plan becomes several.
-    """
+    """Return WKB as little-endian hexadecimal EWKB, polygons in plan as several."""
     order, kind = struct.unpack_from("<BI", wkb)
     if kind == WKB_POLYGON:
         kind, wkb = WKB_MULTIPOLYGON, struct.pack("<BII", 1, WKB_MULTIPOLYGON, 1) + wkb

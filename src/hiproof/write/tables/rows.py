@@ -35,10 +35,7 @@ class Rows(NamedTuple):
     history: tuple[Row, ...] = ()
 
     def to_text(self) -> bytes:
-        """Return the rows as JSON, a line a table.
-
-        Geometries are in hexadecimal digits.
-        """
+        """Return the rows as JSON, a line a table, geometries in hexadecimal digits."""
         tables = ([[wkb and wkb.hex(), values] for wkb, values in table] for table in self)
         return b"\n".join(ENCODER.encode(table).encode() for table in tables)
 
@@ -88,10 +85,7 @@ def table_rows(
 
 
 def building_row(building: Building, attributes: dict[str, Any], units: Units = METRES) -> Row:
-    """Return the outline of `building` and its attributes by column.
-
-    The outline is in `units`, None where it is unknown.
-    """
+    """Return the outline in `units`, None if unknown, and attributes by column."""
     names = {
         f"{name}_input" if name.lower() == "id" else name: value
         for name, value in attributes.items()
@@ -100,18 +94,12 @@ def building_row(building: Building, attributes: dict[str, Any], units: Units = 
 
 
 def find_outline(building: Building) -> shapely.Geometry | None:
-    """Return the building's outline in world coordinates.
-
-    It is the modelled one, else the one requested, else None.
-    """
+    """Return the world outline: the modelled one, else the requested, else None."""
     return building.footprint if building.built is None else building.roof.world_outline
 
 
 def part_rows(building: Building, units: Units = METRES) -> tuple[Row, ...]:
-    """Return a row a part that shows.
-
-    It has where the part shows, its type, every parameter and its standard deviation.
-    """
+    """Return a row a part that shows: where, its type, parameters and deviations."""
     rows = []
     for number, visible in enumerate(building.compute_visible_areas()):
         if visible.is_empty:
@@ -122,11 +110,7 @@ def part_rows(building: Building, units: Units = METRES) -> tuple[Row, ...]:
 
 
 def part_values(building: Building, number: int, visible: shapely.Geometry) -> dict[str, Any]:
-    """Return a roof part's values by column.
-
-    They are its type, the area where it is `visible`, place, parameters and their standard
-    deviations.
-    """
+    """Return a part's values: type, `visible` area, place, parameters, deviations."""
     part, (x, y, z) = (
         building.parts[number],
         building.roof.frame.to_world(building.parts[number].translation),
@@ -215,10 +199,7 @@ def make_polygons(vertices: np.ndarray, faces: Sequence[Face]) -> np.ndarray:
 
 
 def encode_geometry(geometry: shapely.Geometry | None, units: Units) -> bytes | None:
-    """Return a plan geometry (world metres) in `units` as WKB.
-
-    It is None for one that holds nothing.
-    """
+    """Return a plan geometry (world metres) in `units` as WKB, None for an empty one."""
     if geometry is None or geometry.is_empty:
         return None
     return shapely.to_wkb(

@@ -69,10 +69,7 @@ SUN_COLUMN = f"{OWN}sun_kwh_m2"
 
 
 def sun_style(sky: str) -> Style:
-    """Return the style of roof surfaces by the sun.
-
-    Its colours are those of SUN_STOPS, and the labels name the `sky`.
-    """
+    """Return the style of surfaces by the sun, SUN_STOPS, with labels that name the `sky`."""
     names = {f"from {least:g} kWh/m2 ({sky})": least for least, _ in reversed(SUN_STOPS)}
     cases = (f"WHEN \"{SUN_COLUMN}\" >= {least:g} THEN '{name}'" for name, least in names.items())
     colours = dict(zip(names, (colour for _, colour in reversed(SUN_STOPS)), strict=True))
@@ -81,10 +78,7 @@ def sun_style(sky: str) -> Style:
 
 
 def choose_styles(columns: Mapping[str, Collection[str]], sky: str = "") -> tuple[Style, ...]:
-    """Return the styles of tables by their columns.
-
-    Roof surfaces that have the sun are drawn by it.
-    """
+    """Return styles of tables by their columns; roof surfaces with the sun show it."""
     sun = sun_style(sky)
     if SUN_COLUMN not in columns.get(sun.layer, ()):
         return STYLES
@@ -95,10 +89,7 @@ def choose_styles(columns: Mapping[str, Collection[str]], sky: str = "") -> tupl
 
 
 def style_rows(styles: Sequence[Style] = STYLES) -> list[dict[str, Any]]:
-    """Return the rows of `layer_styles`.
-
-    Those of a run are by roof type, the default of every layer, and by the quality of the models.
-    """
+    """Return the rows of `layer_styles`: by roof type (default) and by quality of models."""
     return [
         {
             "f_table_catalog": "",
@@ -144,10 +135,7 @@ def style_qml(style: Style) -> str:
 
 
 def fill_symbol(number: int, colour: str, alpha: float) -> str:
-    """Return a plain fill with thin lines around it.
-
-    `colour` is #rrggbb.
-    """
+    """Return a plain fill of `colour` (#rrggbb) with thin lines around it."""
     red, green, blue = (int(colour[k : k + 2], 16) for k in (1, 3, 5))
     options = {
         "color": f"{red},{green},{blue},{round(255 * alpha)}",

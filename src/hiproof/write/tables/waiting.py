@@ -18,10 +18,7 @@ BATCH_ROWS = 10_000  # rows handed on at once: the overhead is a call's, the mem
 
 
 class WaitingRows:
-    """Rows of one table in a temporary file, and each column's types.
-
-    They are the text that their buildings brought.
-    """
+    """Rows of a table, text of its buildings, in a temporary file, and its columns' types."""
 
     def __init__(self, layer: str, file: BinaryIO) -> None:
         self.layer, self.file, self.count = layer, file, 0
@@ -46,10 +43,7 @@ class WaitingRows:
         return self.layer != HISTORY or self.count > 0
 
     def kinds(self, prefix: str, limit: int | None = None) -> dict[str, type]:
-        """Return the one type of every column.
-
-        Of more than `limit`, the last of the input's own are left out.
-        """
+        """Return each column's one type; above `limit`, the last of the input's own go."""
         names = [self.layer] if self.layer in TABLES else ["roofer", "hiproof", "osm"]
         prefixes = {"roofer": prefix, "hiproof": OWN}
         declared = {
@@ -69,10 +63,7 @@ class WaitingRows:
         return kinds or {"id": str}
 
     def batches(self) -> Iterator[list[Row]]:
-        """Yield the rows, some thousands at a time.
-
-        There is one empty batch if there are none.
-        """
+        """Yield the rows, some thousands at a time, or one empty batch."""
         self.file.seek(0)
         rows = (
             (wkb and bytes.fromhex(wkb), values)
@@ -85,10 +76,7 @@ class WaitingRows:
 
 
 def column_kind(result: set[type], declared: str) -> type:
-    """Return the one type that holds all values.
-
-    A figure that is always unknown stays what it is `declared`.
-    """
+    """Return the one type of all values, as `declared` where all are unknown."""
     kinds = result - {type(None)}
     if not kinds:
         return {"text": str, "count": int}.get(declared, float)

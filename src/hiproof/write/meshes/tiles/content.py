@@ -53,10 +53,7 @@ def tile_glb(
 def primitive(
     document: GlbDocument, meshes: Sequence[TileMesh], corners: np.ndarray
 ) -> dict[str, Any]:
-    """Return all triangles as one primitive.
-
-    Corners of a face that are one vertex are written once.
-    """
+    """Return all triangles as one primitive, shared corners of a face written once."""
     ids = np.repeat(np.arange(len(meshes)), [len(mesh.corners) for mesh in meshes])
     corner_table = np.zeros(
         len(corners),
@@ -100,10 +97,7 @@ def primitive(
 
 @dataclass(frozen=True)
 class TileMesh:
-    """Corners (3 t, 3), y up, with normals and colours.
-
-    Their face's `normals` are (3 t, 3), `colours` (3 t, 4) linear bytes.
-    """
+    """Corners (3 t, 3), y up, with `normals` (3 t, 3) and linear `colours` (3 t, 4)."""
 
     corners: np.ndarray
     normals: np.ndarray
@@ -124,10 +118,7 @@ class TileMesh:
 
 
 def make_mesh(model: ViewedModel, vertices: np.ndarray) -> TileMesh:
-    """Return the mesh of a model.
-
-    Its solid's `vertices` (n, 3) are east, north, up of the tileset's frame.
-    """
+    """Return a model's mesh; `vertices` (n, 3) are east, north, up of the tileset's frame."""
     corners, normals, colours = [], [], []
     for look, faces in model.faces_by_look().items():
         places, facing = flat_triangles(vertices, faces)

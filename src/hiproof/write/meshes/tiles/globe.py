@@ -95,10 +95,7 @@ class Globe:
         )
 
     def geographic(self, world: np.ndarray) -> np.ndarray:
-        """Return longitude, latitude (degrees) and height of world metres (n, 3).
-
-        They are (n, 3); height is above the ellipsoid.
-        """
+        """Return longitude, latitude (degrees), ellipsoidal height (n, 3) of world metres."""
         x, y, z = self.units.from_metres(world).T
         if self.is_3d:
             return np.column_stack(self.transformer.transform(x, y, z))
@@ -107,10 +104,7 @@ class Globe:
         )
 
     def to_earth(self, world: np.ndarray) -> np.ndarray:
-        """Return Earth-centred coordinates (n, 3) of world metres (n, 3).
-
-        Raises InputError for places that have none.
-        """
+        """Return Earth-centred coordinates (n, 3) of world metres; InputError without any."""
         earth = np.column_stack(self.to_centre.transform(*self.geographic(world).T))
         # Projections answer for places beyond their own, but do not find the way back.
         if not np.allclose(self.from_earth(earth), world, rtol=0, atol=SAME_PLACE_M):
@@ -135,10 +129,7 @@ class Globe:
 
 
 def with_heights(crs: Any) -> Any:
-    """Return the transformer of plan and heights, if it is more than a guess.
-
-    None where heights or a grid are missing.
-    """
+    """Return the transformer of plan and heights, None where it would be a guess."""
     has_heights = vertical_crs(crs) is not None or len(crs.axis_info) == 3
     return find_best_transformer(crs, GEOGRAPHIC_CRS, allow_ballpark=False) if has_heights else None
 

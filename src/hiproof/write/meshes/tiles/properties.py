@@ -36,10 +36,7 @@ DESCRIPTIONS = {
 
 
 class Property(NamedTuple):
-    """A column: its `id`, its attribute's `name`, whether it holds numbers.
-
-    `id` is that in the class.
-    """
+    """A column: its `id` in the class, its attribute's `name`, whether it holds numbers."""
 
     id: str
     name: str
@@ -59,10 +56,7 @@ class Found:
                 self.are_numbers[name] = was_number is not False and is_number(value)
 
     def properties(self) -> list[Property]:
-        """Return the columns, named as the extension allows.
-
-        Names have letters, digits and underscores.
-        """
+        """Return the columns, named of letters, digits and underscores for the extension."""
         names = UniqueNames()
         return [
             Property(property_id(names, name), name, bool(kind))

@@ -80,10 +80,7 @@ def write_models(
 
 
 class WaitingCity:
-    """Buildings in a file, and what decides their tile.
-
-    That is their triangles and their box, east, north, up.
-    """
+    """Buildings in a file, with the triangles and boxes (east, north, up) of each."""
 
     def __init__(self, file: BinaryIO, globe: Globe | None) -> None:
         self.file, self.globe, self.found = file, globe, Found()
@@ -106,10 +103,7 @@ class WaitingCity:
         mesh.save(self.file)
 
     def local(self, world: np.ndarray) -> np.ndarray:
-        """Return east, north, up (n, 3) of world metres.
-
-        The first building's corner is the origin.
-        """
+        """Return east, north, up (n, 3) of world metres from the first building's corner."""
         if not self.offsets:
             self.transform = frame_at(np.floor(world.min(axis=0)), self.globe)
         places = world if self.globe is None else self.globe.to_earth(world)
@@ -175,10 +169,7 @@ class TileFiles:
 
 
 def frame_at(origin: np.ndarray, globe: Globe | None) -> np.ndarray:
-    """Return the transform (4, 4) from the tileset's frame at `origin` (3,).
-
-    It leads from world metres to the globe or, without one, to the world.
-    """
+    """Return the transform (4, 4) of the frame at `origin` (3,) to the globe or the world."""
     if globe is None:
         frame = np.eye(4)
         frame[:3, 3] = origin
@@ -188,10 +179,7 @@ def frame_at(origin: np.ndarray, globe: Globe | None) -> np.ndarray:
 
 
 def bound_boxes(boxes: np.ndarray) -> dict[str, list[float]]:
-    """Return the bounding volume around `boxes` (n, 2, 3).
-
-    It is the middle, then half of each axis.
-    """
+    """Return the bounding volume around `boxes` (n, 2, 3): middle, half of each axis."""
     smallest, largest = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
     return {
         "box": [
@@ -202,10 +190,7 @@ def bound_boxes(boxes: np.ndarray) -> dict[str, list[float]]:
 
 
 def make_room(folder: Path) -> None:
-    """Make the parent of `folder`, and protect other folders.
-
-    Raises OutputError where `folder` is no tileset, so that nothing else is ever replaced.
-    """
+    """Make the parent of `folder`; OutputError where `folder` is there and no tileset."""
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         is_ours = not folder.exists() or (
@@ -222,10 +207,7 @@ def make_room(folder: Path) -> None:
 
 @dataclass(frozen=True)
 class Tile:
-    """A tile: its `name`, and the `items` (k,) that it draws.
-
-    The name is its way from the root ("r", then a digit a level); items are indices.
-    """
+    """A tile: its way from the root ("r", a digit a level), and indices (k,) of its items."""
 
     name: str
     items: np.ndarray
@@ -272,10 +254,7 @@ def quadtree(
 
 
 def grow_tile(name: str, items: np.ndarray, lower: np.ndarray, side: float, tables: tuple) -> Tile:
-    """Return the tile of a square, in which `items` stand.
-
-    The square goes from `lower` (2,) over `side` metres.
-    """
+    """Return the tile of `items` in the square from `lower` (2,) over `side` metres."""
     centres, sizes, triangles, limit, widest = tables
     largest = items[np.argsort(-sizes[items], kind="stable")]
     fits = np.cumsum(triangles[largest]) <= limit
