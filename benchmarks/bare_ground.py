@@ -29,6 +29,7 @@ from hiproof.frames import LocalFrame
 from hiproof.geometry.thin import thin_to_grid
 from hiproof.settings import Settings
 from hiproof.simulate.relief import Plane
+from hiproof.simulate.roofs import box
 from hiproof.simulate.scanner import Scan, ScanSettings, scan_scene
 from hiproof.simulate.scene import (
     SOURCE_GROUND,
@@ -39,7 +40,6 @@ from hiproof.simulate.scene import (
     Defects,
     make_scene,
 )
-from hiproof.simulate.shapes import box
 
 from .tables import FigureTable, make_parser
 

@@ -10,8 +10,7 @@ import numpy as np
 import shapely
 
 from hiproof.model import Part
-from hiproof.simulate.roofs import SimBuilding, find_largest_part, united_outline
-from hiproof.simulate.shapes import make_part
+from hiproof.simulate.roofs import SimBuilding, find_largest_part, make_part, united_outline
 
 SMALLEST_PART_M2 = 12.0
 """Area (m2) of a part that is raised, lowered or removed; dormers are small objects."""

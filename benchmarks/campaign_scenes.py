@@ -31,8 +31,7 @@ from hiproof.simulate import (
     scan,
 )
 from hiproof.simulate.compounds import CompoundLayout, houses_in_a_row
-from hiproof.simulate.roofs import assemble
-from hiproof.simulate.shapes import make_part
+from hiproof.simulate.roofs import assemble, make_part
 
 BUILDINGS_A_SCENE = 100
 SPACING_M = 90.0  # Distance between the buildings of a scene. A city block is up to 60 m wide.

@@ -10,7 +10,7 @@ import hiproof
 from hiproof import read_parameters
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.compose import check_solid
-from hiproof.edit.doubt import measure_doubt
+from hiproof.edit.folder import measure_doubt
 from hiproof.errors import InputWarning
 from hiproof.settings import Settings
 from hiproof.status import Doubt, Status

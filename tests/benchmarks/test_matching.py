@@ -24,7 +24,7 @@ from benchmarks.matching import (
 from hiproof.compose import compose
 from hiproof.model import Building, Model
 from hiproof.simulate import COMPOUND_KINDS, random_building, random_compound
-from hiproof.simulate.shapes import make_part
+from hiproof.simulate.roofs import make_part
 from hiproof.status import Status
 
 

@@ -17,8 +17,8 @@ from flat_town import make_request
 from hiproof.city.plan.overrides import read_overrides
 from hiproof.compose import check_solid
 from hiproof.edit.desk import Desk
-from hiproof.edit.doubt import measure_doubt
 from hiproof.edit.edits import EDITS_FILE, UNTOUCHED, Edits, OtherVersion
+from hiproof.edit.folder import measure_doubt
 from hiproof.errors import HiproofError, InputError, InputWarning
 from hiproof.evaluate.run import evaluate_run
 from hiproof.read.models.solids import read_solids

@@ -18,7 +18,7 @@ from hiproof.simulate import (
     random_compound,
     read_truth,
 )
-from hiproof.simulate.shapes import box
+from hiproof.simulate.roofs import box
 
 SEEDS = range(12)
 PARTS = {

@@ -11,7 +11,7 @@ from hiproof.frames import LocalFrame
 from hiproof.model import Roof
 from hiproof.settings import ReadSettings
 from hiproof.simulate import random_building
-from hiproof.simulate.shapes import make_part
+from hiproof.simulate.roofs import make_part
 from hiproof.update.register import SampledRoof, SurveyShift, read_shift, register_surveys
 
 READ = ReadSettings()

@@ -18,7 +18,7 @@ from hiproof.errors import HiproofError, InputError, InputWarning
 from hiproof.read.crs import find_units
 from hiproof.write.colours import linear_rgb, type_colour
 from hiproof.write.meshes.tiles import Globe, write_models
-from hiproof.write.meshes.tiles.properties import NO_NUMBER, Found
+from hiproof.write.meshes.tiles.content import NO_NUMBER, Found
 from hiproof.write.meshes.tiles.tileset import quadtree
 from hiproof.write.meshes.viewed import ViewedModel
 from hiproof.write.naming import FileUnits

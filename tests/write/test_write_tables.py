@@ -17,7 +17,7 @@ from hiproof import build, read_parameters
 from hiproof.errors import InputError
 from hiproof.parametric.run import build_file
 from hiproof.write import write_attributes, write_parameters
-from hiproof.write.tables import waiting
+from hiproof.write.tables import vector_layer
 from hiproof.write.tables.geopackage import attributes_with_a_column
 from hiproof.write.tables.rows import part_rows
 
@@ -188,7 +188,7 @@ def test_names_that_clash(tmp_path):
 
 
 def test_many_rows_are_written_in_batches(tmp_path, monkeypatch):
-    monkeypatch.setattr(waiting, "BATCH_ROWS", 4)
+    monkeypatch.setattr(vector_layer, "BATCH_ROWS", 4)
     columns, _, _ = table(
         tmp_path, [make_lost_building(str(n), attributes={"n": n}) for n in range(11)]
     )

@@ -19,7 +19,11 @@ def footprints(
     crs: str | None = None,
     config: Path | None = None,
 ) -> None:
-    """Write the footprints of the clouds' extent to `out`; returns their source."""
+    """Fetch building footprints from Overture Maps (extra `parquet`).
+
+    The file holds all footprints in the extent of the clouds. Pass it to `hiproof reconstruct
+    --footprints`, which then needs no network connection.
+    """
     if out.suffix.lower() != ".gpkg":
         raise SettingsError(f"expected --out to name a GeoPackage such as f.gpkg, got {out}")
     with show_progress("fetch"):
@@ -35,10 +39,7 @@ def footprints(
 def fetch_footprints(
     clouds: list[str], out: Path, layer: str | None, crs: str | None, config: Path | None
 ) -> dict[str, Any]:
-    """Write the footprints of the clouds' extent to `out`.
-
-    Returns their source.
-    """
+    """Write the footprints of the clouds' extent to `out`; returns their source."""
     from ..city.plan.from_overture import keep_footprints
     from ..city.plan.prepare import read_headers
     from ..city.request import Request

@@ -3,18 +3,16 @@
 Plan cells become levels, levels a closed shell, and every solid is checked.
 
 settle            the roof made of exactly the numbers that are written of it
-simpler           parts given up one by one, where a roof cannot become a valid solid
 readable          whether a file of parameters can hold a roof
 solid             `compose`: the steps below, one after the other; terrain intersection
 cells             outline, pieces and the lines where the active plane changes as one plan of cells
 arrangement       the planar arrangement under them, on an integer grid
-slivers           cells too small or thin, given to their neighbours
 buckets           what lies near a place, for it
 levels            which heights meet over every vertex of the plan
 shell             roof, wall and ground faces that share them
 check             whether the result is valid by ISO 19107
 check_faces       its rules for each face by itself
-check_shell       its rules for the shell of sound faces
+simpler           parts given up one by one, where a roof cannot become a valid solid
 blocks            LoD1: prisms over the outline; installations on roofs
 underside         walls down to the terrain, and passages below a solid
 overhang          slabs of a roof beyond walls

@@ -8,11 +8,150 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
 
-from ..geometry.flat_shell import FlatShell, weld
+from ..geometry.components import label_components
+from ..geometry.flat_shell import ON_SEGMENT_M, FlatShell, cross_strictly, weld
 from ..model import Solid
-from .check_faces import bent_faces, check_faces
-from .check_shell import check_shell
+from .check_faces import FacePlanes, bent_faces, check_faces
+
+OFF_PLANE_M = 2e-4  # m; besides its flatness, how far off a face still counts as on it
+
+
+def check_shell(shell: FlatShell, planes: FacePlanes) -> list[tuple[int, int, int]]:
+    """Return the findings of a shell, whose planes are those of `check_faces`."""
+    if shell.faces < 4:
+        return [(301, -1, -1)]
+    rows = check_edges(shell)
+    rows = (rows or check_umbrellas(shell)) + check_intersections(shell, planes)
+    return rows or ([(405, -1, -1)] if shell.volume <= 0 else [])
+
+
+def check_edges(shell: FlatShell) -> list[tuple[int, int, int]]:
+    """Find codes 302, 303, 307 (every edge twice, oppositely) and 305 (one component)."""
+    order = np.argsort(shell.edge_of, kind="stable")
+    edges, start, uses = np.unique(shell.edge_of[order], return_index=True, return_counts=True)
+    is_rising = shell.index < shell.index[shell.after]
+    rising = np.bincount(shell.edge_of, is_rising)
+    faces, rows = shell.face_of[order].tolist(), []
+    for k in edges[(uses != 2) | (2 * rising != uses)].tolist():
+        code = {1: 302, 2: 307}.get(int(uses[k]), 303)
+        rows.append((code, faces[start[k]], faces[start[k] + 1] if uses[k] > 1 else -1))
+    links = np.array([np.repeat(shell.face_of[order[start]], uses), faces])
+    apart = np.flatnonzero(label_components(shell.faces, links))
+    return rows + [(305, face, -1) for face in apart[:1].tolist()]
+
+
+def check_umbrellas(shell: FlatShell) -> list[tuple[int, int, int]]:
+    """Find code 303 where faces around a vertex form more than one fan.
+
+    Only for shells whose edges are all paired. A vertex in which two rings of one face touch is
+    left out: which corners adjoin there is not shown by the rings.
+    """
+    one, two = np.argsort(shell.edge_of, kind="stable").reshape(-1, 2).T
+    links = np.column_stack([(one, shell.after[two]), (two, shell.after[one])])
+    labels, rows = label_components(len(shell.index), links), []
+    fans = np.unique(np.column_stack([shell.index, labels]), axis=0)[:, 0]
+    for vertex in np.flatnonzero(np.bincount(fans) > 1).tolist():
+        corners = np.flatnonzero(shell.index == vertex)
+        faces = shell.face_of[corners]
+        if len(np.unique(faces)) == len(faces):
+            other = faces[labels[corners] != labels[corners[0]]]
+            rows.append((303, int(other[0]), int(faces[0])))
+    return rows
+
+
+def check_intersections(shell: FlatShell, planes: FacePlanes) -> list[tuple[int, int, int]]:
+    """Find code 306: faces of meeting boxes that meet elsewhere than at shared edges."""
+    starts = shell.ring_start[shell.face_start[:-1]]
+    low = np.minimum.reduceat(shell.corners, starts)
+    high = np.maximum.reduceat(shell.corners, starts)
+    slack = planes.flatness + OFF_PLANE_M
+    wide = slack[:, None]
+    boxes = shapely.box(*(low - wide)[:, :2].T, *(high + wide)[:, :2].T)
+    face, other = shapely.STRtree(boxes).query(boxes)
+    meets = (low[other] <= high[face] + wide[face]) & (low[face] <= high[other] + wide[face])
+    keep = (face != other) & meets.all(axis=1)
+    place, corner = shell.pair_with_corners(other[keep])
+    face = face[keep][place]
+    pierces = find_piercing(shell, planes, face, corner, low, high, slack)
+    pairs = np.unique(np.column_stack([face, shell.face_of[corner]])[pierces], axis=0)
+    return [(306, one, two) for one, two in pairs.tolist()]
+
+
+def find_piercing(
+    shell: FlatShell,
+    planes: FacePlanes,
+    face: np.ndarray,
+    corner: np.ndarray,
+    low: np.ndarray,
+    high: np.ndarray,
+    slack: np.ndarray,
+) -> np.ndarray:
+    """Return whether (k,) the edges that begin at `corner` (k,) pierce a `face` (k,).
+
+    `low` and `high` (f, 3) are the faces' boxes, and so far off its plane counts as on a face.
+    Shared vertices do not count.
+    """
+    result = np.zeros(len(face), bool)
+    a, b = shell.corners[corner], shell.corners[shell.after[corner]]
+    off = slack[face]
+    above = np.column_stack(
+        [(end * planes.normals[face]).sum(axis=1) - planes.offsets[face] for end in (a, b)]
+    )
+    is_near = (np.minimum(a, b) <= high[face] + off[:, None]).all(axis=1)
+    is_near &= (np.maximum(a, b) >= low[face] - off[:, None]).all(axis=1)
+    is_near &= (above.min(axis=1) <= off) & (above.max(axis=1) >= -off)
+    result[is_near] = pierce(
+        shell, planes, face[is_near], corner[is_near], above[is_near], off[is_near]
+    )
+    return result
+
+
+def pierce(
+    shell: FlatShell,
+    planes: FacePlanes,
+    face: np.ndarray,
+    corner: np.ndarray,
+    above: np.ndarray,
+    slack: np.ndarray,
+) -> np.ndarray:
+    """Return whether edges (k,), ends `above` (k, 2) a face's plane, pierce or lie in the face."""
+    on_plane = np.abs(above) <= slack[:, None]
+    in_plane = on_plane.all(axis=1)
+    is_through = ~in_plane & (above.min(axis=1) < -slack) & (above.max(axis=1) > slack)
+    size = len(shell.index)
+    is_shared = np.isin(face * size + shell.edge_of[corner], shell.face_of * size + shell.edge_of)
+    size = len(shell.vertices)
+    is_own = np.isin(face * size + shell.index[corner], shell.face_of * size + shell.index)
+    p, q = (planes.project(face, shell.corners[k]) for k in (corner, shell.after[corner]))
+    depth = measure_depth(shell, planes, face, p, on_plane[:, 0] & ~is_own)
+    result = depth > -ON_SEGMENT_M
+    share = np.where(is_through, above[:, 0] / np.where(is_through, -np.diff(above)[:, 0], 1), 0.5)
+    is_asked = (in_plane & ~is_shared) | is_through
+    result |= measure_depth(shell, planes, face, p + share[:, None] * (q - p), is_asked) > slack
+    asked = np.flatnonzero(in_plane & ~is_shared & ~result)
+    place, edge = shell.pair_with_corners(face[asked])
+    asked = asked[place]
+    ends = shell.index[[corner[asked], shell.after[corner[asked]]]]
+    is_apart = (shell.index[edge] != ends) & (shell.index[shell.after[edge]] != ends)
+    crosses = cross_strictly(p[asked], q[asked], planes.flat[edge], planes.flat[shell.after[edge]])
+    result[asked[crosses & is_apart.all(axis=0)]] = True
+    return result
+
+
+def measure_depth(
+    shell: FlatShell, planes: FacePlanes, face: np.ndarray, points: np.ndarray, is_asked: np.ndarray
+) -> np.ndarray:
+    """Return how far inside the border of a face (k,) points (k, 2) lie, negative outside."""
+    result = np.full(len(face), -np.inf)
+    numbers, which = np.unique(face[is_asked], return_inverse=True)
+    if len(numbers):
+        areas, places = shell.draw_faces(numbers, planes.flat), shapely.points(points[is_asked])
+        depth = shapely.distance(shapely.boundary(areas)[which], places)
+        result[is_asked] = np.where(shapely.intersects(areas[which], places), depth, -depth)
+    return result
+
 
 CODES = {
     101: "has a ring with fewer than three points",

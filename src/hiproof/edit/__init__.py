@@ -2,7 +2,6 @@
 
 It lists the buildings of a run that need attention.
 
-doubt       how much a building needs eyes, and why
 folder      the run's folder: buildings sorted by doubt, each read when it is asked for
 points      the roof points of one building, read from the run's clouds as the run read them
 actions     one edit: a building in, another out, by the functions of `parametric`

@@ -19,7 +19,7 @@ from ..write.citygml.surfaces import surface_ids
 from ..write.citygml.version2 import choose_solid
 from ..write.fragments import Sheet
 from ..write.values import round_value, xml_text
-from .house_type import is_house
+from .answer import is_house
 from .walls import measure_faces
 
 ENERGY_NAMESPACE = "http://www.sig3d.org/citygml/2.0/energy/1.0"

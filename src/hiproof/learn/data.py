@@ -19,8 +19,8 @@ from ..read.models.cityjson import features
 from ..read.models.solids import read_solids
 from ..segment.inference import NOT_ROOF
 from ..simulate import ROOF_TYPES, Scan, scan, scan_solids
+from ..simulate.roofs import find_label
 from ..simulate.scene import SOURCE_ROOF
-from ..simulate.shapes import find_label
 from ..simulate.training import random_settings
 from .houses import training_house
 from .roofn3d import RoofN3D

@@ -13,8 +13,7 @@ import shapely
 
 from ..model import Part
 from ..primitives.catalogue import ROUND
-from ..simulate.roofs import SimBuilding, assemble, random_building, random_parameters
-from ..simulate.shapes import make_part
+from ..simulate.roofs import SimBuilding, assemble, make_part, random_building, random_parameters
 
 ANNEX_TYPES = ("flat", "monopitch", "gable", "hip")
 LENGTHS = ("length", "ridge_length", "top_length")

@@ -7,7 +7,6 @@ roof        pieces, parts, roofs: a roof is a max of mins of planes
 solid       faces, solids
 installation  objects on a roof
 overhang    how far a roof reaches beyond its walls
-fit         one primitive fitted to points
 building    models and buildings; how a solid ends below: terrain, passages
 shown       where each part of a roof shows from above
 heights     heights of roofs at many points
@@ -15,11 +14,10 @@ roof_figures  heights, slopes, ridge and volume of a solid
 """
 
 from .building import ONE_LEVEL, Building, Model, Passage, Quality, Underside
-from .fit import Fit
 from .inputs import Footprint, PointCloud, as_xyz
 from .installation import Installation
 from .overhang import Eaves, Overhang
-from .roof import Part, Piece, Roof
+from .roof import Fit, Part, Piece, Roof
 from .solid import CEILING, GROUND, ROOF, WALL, Face, Solid
 
 __all__ = [

@@ -257,10 +257,7 @@ def moved_along(
 
 
 def leaving_out(part: dict[str, Any], area: shapely.Geometry) -> dict[str, Any]:
-    """Return the part without what it roofs of `area`.
-
-    Raises InputError where nothing is left of it.
-    """
+    """Return the part without `area`; raises InputError where nothing is left of it."""
     if not roofed_by(part).intersection(area).area > 0.0:
         return part
     rings = list_rings(shapely.difference(roofed_by(part), area, grid_size=GRID_M))
@@ -283,7 +280,7 @@ def roofed_by(part: dict[str, Any]) -> shapely.Geometry:
 
 
 def cover_rectangle(part: dict[str, Any]) -> shapely.Polygon:
-    """Return the part without `area`; raises InputError where nothing is left of it."""
+    """Return the rectangle of a part in plan; raises InputError for what are no numbers."""
     numbers_by_name(part.get("parameters") or {}, "the parameters")
     place(part.get("position"), "position")
     number(part.get("rotation", 0.0), "rotation")

@@ -40,7 +40,7 @@ from .record import (
 
 
 def read_underside(record: Mapping[str, Any], building: Building, roof: Roof) -> Underside:
-    """Return the rectangle of a part in plan; raises InputError for what are no numbers."""
+    """Read a solid's lower end in the frame of its `roof`; InputError for what makes none."""
     walls = record.get("walls", "level")
     if walls not in ("level", "terrain"):
         raise InputError(f"expected walls of level or terrain, got {excerpt(walls)}; choose one")

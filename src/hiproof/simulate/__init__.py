@@ -2,7 +2,7 @@
 
 Training, experiments, tests and the demo use them.
 
-building = random_building(rng, "hip")          one primitive (roofs, shapes) ...
+building = random_building(rng, "hip")          one primitive (roofs) ...
 building = random_compound(rng, "L")            ... or several (compounds)
 cloud = scan(building, rng, ScanSettings()) labelled points (scene -> flight -> raycast -> scanner)
 points, labels, type = training_sample(rng)     the same for a network (training)
@@ -15,10 +15,9 @@ city             a town of any size
 
 from .compounds import COMPOUND_KINDS, random_compound
 from .neighbourhood import demo_files
-from .roofs import SimBuilding, random_building, read_truth
+from .roofs import NOT_ROOF, ROOF_TYPES, SimBuilding, random_building, read_truth
 from .scanner import Scan, ScanSettings, scan, scan_solids, uniform_points
 from .scene import SOURCES, Defects
-from .shapes import NOT_ROOF, ROOF_TYPES
 from .training import training_sample
 
 __all__ = [

@@ -15,8 +15,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..model import Part
-from .roofs import SimBuilding, assemble, random_eave, random_parameters
-from .shapes import make_part
+from .roofs import SimBuilding, assemble, make_part, random_eave, random_parameters
 
 COMPOUND_KINDS = (
     "L",

@@ -15,7 +15,7 @@ from ..errors import InputError
 from ..model import Solid
 from .flight import Beams, join_beams, make_beams, random_swaths
 from .raycast import cast_convex, cast_crowns, cast_triangles
-from .roofs import SimBuilding
+from .roofs import NOT_ROOF, SimBuilding, find_label
 from .scene import (
     SOURCE_CLUTTER,
     SOURCE_GROUND,
@@ -25,7 +25,6 @@ from .scene import (
     random_scene,
     solids_scene,
 )
-from .shapes import NOT_ROOF, find_label
 
 MERGED_RETURNS_M = 0.6  # m; a pulse of some nanoseconds cannot tell surfaces nearer to each other
 LEAF_PATH_M = 1.8  # m that a beam goes through leaves on average before it meets one
@@ -133,10 +132,7 @@ def scan_scene(
     rng: np.random.Generator,
     settings: ScanSettings,
 ) -> Scan:
-    """Scan `area` with noise and the cloud's defects.
-
-    `area` is in plan, in the scene's frame.
-    """
+    """Scan `area`, in plan of the scene's frame, with noise and the cloud's defects."""
     x_low, y_low, x_high, y_high = area.bounds
     centre = np.array([(x_low + x_high) / 2, (y_low + y_high) / 2])
     reach = math.hypot(x_high - x_low, y_high - y_low) / 2
@@ -159,7 +155,11 @@ def scan_scene(
 
 
 def returns(scene: Scene, beams: Beams, rng: np.random.Generator, settings: ScanSettings) -> Scan:
-    """Scan `area`, in plan of the scene's frame, with noise and the cloud's defects."""
+    """Return the points of all beams.
+
+    A wide beam mixes the heights of two near surfaces and splits over two far ones; leaves catch
+    some of the light and let the rest through.
+    """
     z_hit, source, label = first_hits(scene, beams.xy0, beams.slope)
     n = len(z_hit)
     xy0, slope, shift = beams.xy0, beams.slope, beams.shift
@@ -192,10 +192,7 @@ def returns(scene: Scene, beams: Beams, rng: np.random.Generator, settings: Scan
 def first_hits(
     scene: Scene, xy0: np.ndarray, slope: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return height (n,), source and label (n,) of each beam's first surface.
-
-    It is the terrain where there is nothing else.
-    """
+    """Return height (n,), source and label (n,) of beams' first surface, else the terrain."""
     z_hit = scene.terrain.hit(xy0, slope)
     source, label = np.full(len(xy0), SOURCE_GROUND, np.int8), np.full(len(xy0), NOT_ROOF, np.int8)
     bodies = scene.halfspaces, scene.starts, scene.discs
@@ -221,7 +218,7 @@ def caught_by_leaves(
     label: np.ndarray,
     rng: np.random.Generator,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return height (n,), source and label (n,) of beams' first surface, else the terrain."""
+    """Add leaves' returns and return their beams; a third return from below, too."""
     z_crown = np.full(len(xy0), -np.inf)
     cast_crowns(xy0, slope, scene.crowns, rng.exponential(LEAF_PATH_M, len(xy0)), z_crown)
     caught = z_crown > z_hit
@@ -243,7 +240,7 @@ def without_strip(
 
 
 def without_corner(rng: np.random.Generator, cloud: Scan, centre: np.ndarray, reach: float) -> Scan:
-    """Add leaves' returns and return their beams; a third return from below, too."""
+    """Drop the points of a disc near the roof's edge that is wet, dark or hidden."""
     angle, radius = rng.uniform(-math.pi, math.pi), reach * rng.uniform(0.25, 0.6)
     middle = centre + 0.8 * reach * np.array([math.cos(angle), math.sin(angle)])
     keep = ((cloud.points[:, :2] - middle) ** 2).sum(axis=1) > radius**2
@@ -270,7 +267,11 @@ def with_outliers(rng: np.random.Generator, cloud: Scan, share: float) -> Scan:
 def uniform_points(
     building: SimBuilding, rng: np.random.Generator, density: float = 4.72, noise: float = 0.12
 ):
-    """Drop the points of a disc near the roof's edge that is wet, dark or hidden."""
+    """Draw points (n, 3), world metres, as in the paper's Table 3.
+
+    They lie evenly over the outline, on the roof, with vertical errors whose size is uniform within
+    1 `noise` for 90 %, within 1-2 for 9 % and within 2-3 for 1 % of the points.
+    """
     outline = building.outline
     x_low, y_low, x_high, y_high = outline.bounds
     count = rng.poisson(density * (x_high - x_low) * (y_high - y_low))

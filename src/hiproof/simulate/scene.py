@@ -16,8 +16,16 @@ from ..errors import InputError
 from ..geometry.rings import ring_normal
 from ..model import ROOF, Piece, Solid
 from .relief import Plane, Relief
-from .roofs import SimBuilding, random_parameters, turn_points
-from .shapes import NOT_ROOF, ROOF_TYPES, box, find_label, make_part
+from .roofs import (
+    NOT_ROOF,
+    ROOF_TYPES,
+    SimBuilding,
+    box,
+    find_label,
+    make_part,
+    random_parameters,
+    turn_points,
+)
 
 # what a beam met, by its place in SOURCES
 SOURCE_ROOF, SOURCE_WALL, SOURCE_GROUND, SOURCE_TREE, SOURCE_CLUTTER = range(5)

@@ -10,10 +10,9 @@ import numpy as np
 
 from ..errors import InputError
 from ..primitives import CATALOGUE
-from .roofs import random_building
+from .roofs import ROOF_TYPES, find_label, random_building
 from .scanner import Scan, ScanSettings, scan
 from .scene import SOURCE_ROOF, Defects
-from .shapes import ROOF_TYPES, find_label
 
 MAX_DRAWS = 40  # draws until a cloud has the points asked for, then a sentence says that it has not
 

@@ -1,7 +1,6 @@
 """Tables of buildings, parts and roof surfaces.
 
 rows             the rows of one building
-waiting          rows that wait until the types of columns are settled
 vector_layer     a layer of a vector file, by GDAL
 geopackage       the GeoPackage of a run
 styles           how QGIS draws its layers

@@ -6,8 +6,7 @@ Web maps read it by parts.
 from __future__ import annotations
 
 from .geopackage import BUILDINGS, AttributesWriter
-from .vector_layer import translate_write_errors, write_layer
-from .waiting import column_names
+from .vector_layer import column_names, translate_write_errors, write_layer
 
 
 class FlatGeobufWriter(AttributesWriter):

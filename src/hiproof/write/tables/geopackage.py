@@ -23,8 +23,14 @@ from ..naming import plan_wkt
 from ..writer import BuildingWriter
 from .rows import split_lines, table_rows
 from .styles import TABLE, Style, choose_styles, style_rows
-from .vector_layer import GEOPACKAGE, translate_write_errors, write_layer
-from .waiting import HISTORY, WaitingRows, column_names
+from .vector_layer import (
+    GEOPACKAGE,
+    HISTORY,
+    WaitingRows,
+    column_names,
+    translate_write_errors,
+    write_layer,
+)
 
 BUILDINGS = "buildings"
 OUTLINE_GEOMETRY: dict[str, Any] = {"geometry_type": "MultiPolygon", "promote_to_multi": True}

@@ -13,7 +13,7 @@ from ...read.outlines.geoparquet import import_pyarrow
 from ..head import FileHead
 from .geopackage import BUILDINGS, AttributesWriter
 from .rows import Row
-from .waiting import column_names
+from .vector_layer import column_names
 
 GEOMETRY = "geometry"
 PLAN_TYPES = ["Polygon", "MultiPolygon"]

@@ -33,7 +33,7 @@ from ..meshes.triangles import faces_triangles
 from ..naming import FileUnits
 from ..values import plain_text
 from .rows import Rows, split_lines, table_rows
-from .waiting import HISTORY, WaitingRows, column_kind, column_names
+from .vector_layer import HISTORY, WaitingRows, column_kind, column_names
 
 # first half of the keys of our advisory locks ("hi"); the second is the prefix's, 0 for the
 # extension

@@ -2,8 +2,8 @@
 
 Each tile is one draw call, with the buildings' attributes.
 
-`globe` says where coordinates lie on the Earth, `properties` what is told of a building, `content`
-how it looks and a tile's file, `tileset` the whole, and which building is drawn in which tile.
+`globe` says where coordinates lie on the Earth, `content` what is told of a building, how it looks
+and a tile's file, `tileset` the whole, and which building is drawn in which tile.
 """
 
 from .globe import Globe

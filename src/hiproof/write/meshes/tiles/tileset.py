@@ -21,9 +21,8 @@ from .... import __version__
 from ....errors import InputError, InputWarning, OutputError
 from ...files import output_error, scratch, whole_folder
 from ..viewed import ViewedModel, merge_values
-from .content import TileMesh, make_mesh, tile_glb
+from .content import Found, TileMesh, make_mesh, tile_glb
 from .globe import Globe, make_local_frame
-from .properties import Found
 
 MOST_TRIANGLES = 20_000  # about two megabytes: one draw call, loaded in a moment
 WIDEST_M = 20_000.0  # beyond, coordinates about a tile's middle lose millimetres as float32
