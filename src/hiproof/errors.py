@@ -50,10 +50,8 @@ class FitError(HiproofError):
 class CompositionError(HiproofError):
     """A roof that cannot become a valid solid.
 
-    The caller falls back to a simpler roof.
-
-    `parts` are the numbers of the roof parts whose faces are at fault, empty where that is not
-    known.
+    The caller falls back to a simpler roof. `parts` are the numbers of the roof parts whose faces
+    are at fault, empty where that is not known.
     """
 
     parts: tuple[int, ...] = ()

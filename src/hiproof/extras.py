@@ -14,9 +14,8 @@ from .errors import InputError
 def import_extra(package: str, extra: str, purpose: str, alternative: str = "") -> Any:
     """Import the module `package` for a `purpose`.
 
-    Raises InputError where it cannot be imported, with the `extra` that brings it.
-
-    `alternative` is how to do without, where that is another way to what was asked for.
+    Raises InputError where it cannot be imported, with the `extra` that brings it. `alternative` is
+    how to do without, where that is another way to what was asked for.
 
     >>> import_extra("maths", "all", "sums")
     Traceback (most recent call last):

@@ -54,9 +54,8 @@ class Answer(NamedTuple):
 class LoopbackServer(ThreadingHTTPServer):
     """A server at the loopback address alone.
 
-    `port` 0 is any that is free. Raises InputError where the port is taken.
-
-    Closing it waits for answers on their way, so that what they write is whole.
+    `port` 0 is any that is free. Raises InputError where the port is taken. Closing it waits for
+    answers on their way, so that what they write is whole.
     """
 
     daemon_threads = True

@@ -81,9 +81,8 @@ SECRETS = Secrets()
 def remember(*addresses: object) -> None:
     """Hide the passwords, tokens and signatures of these addresses.
 
-    They are hidden in all that is written from now on.
-
-    What is no address, such as a condition or the name of a file that is there, holds none.
+    They are hidden in all that is written from now on. What is no address, such as a condition or
+    the name of a file that is there, holds none.
     """
     for address in addresses:
         if (

@@ -135,9 +135,8 @@ def classify_points(xyz: np.ndarray, cell_m: float) -> np.ndarray:
 def roof_points(xyz: np.ndarray, more_odds: float = 0.0) -> np.ndarray:
     """Return which (n,) of points (n, 3) lie on a surface, not among leaves.
 
-    The points are those within one building's outline.
-
-    `more_odds` are the log odds of a roof there by what is known besides.
+    The points are those within one building's outline. `more_odds` are the log odds of a roof there
+    by what is known besides.
     """
     if len(xyz) < 4:
         return np.ones(len(xyz), bool)

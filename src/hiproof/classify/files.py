@@ -27,10 +27,9 @@ LEFT_ALONE = (7, 9, 17, 18)  # classes that stay as they are: noise, water, brid
 def classify_file(path: Path, out: Path, settings: Settings) -> dict[str, int]:
     """Write `path` to `out` with ground as class 2 and buildings as class 6.
 
-    Returns the numbers of "points", "ground" and "building".
-
-    Raises InputError for a file that cannot be read or holds nothing but noise, water and bridges,
-    OutputError for one that cannot be written.
+    Returns the numbers of "points", "ground" and "building". Raises InputError for a file that
+    cannot be read or holds nothing but noise, water and bridges, OutputError for one that cannot be
+    written.
     """
     path, out = Path(path), Path(out)
     if out.suffix.lower() not in (".laz", ".las"):

@@ -135,9 +135,8 @@ def separate_houses(
 ) -> list[shapely.Geometry]:
     """Return the areas of the single houses among roof points (n, 3) in `area`.
 
-    All are in world metres. Together the houses are the area.
-
-    Parts of the area within `gap_m` of each other are one block.
+    All are in world metres. Together the houses are the area. Parts of the area within `gap_m` of
+    each other are one block.
 
     >>> x, y = (axis.ravel() for axis in np.meshgrid(np.arange(0.2, 16, 0.4), np.arange(0.2, 9,
     ...     0.4)))

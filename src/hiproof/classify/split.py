@@ -139,10 +139,9 @@ def find_roofs_around(
 ) -> np.ndarray:
     """Return the roof points (indices) of squares around the box.
 
-    The squares hold every group of roof points that meets the box.
-
-    A group that reaches the border of the squares searched so far may go on beyond it: then the
-    next squares are searched too, until no such group does.
+    The squares hold every group of roof points that meets the box. A group that reaches the border
+    of the squares searched so far may go on beyond it: then the next squares are searched too,
+    until no such group does.
     """
     squares = list_squares(box, GAPS_M[-1])
     while True:
@@ -239,10 +238,8 @@ def select_unclassified(cloud: PointCloud) -> np.ndarray | None:
 def is_single(xy: np.ndarray) -> bool:
     """Return whether points (n, 2) are few and close enough for one building.
 
-    This is the paper's case.
-
-    They are at most 60 m wide and 200,000, a drone's of a large house, nine tenths of them
-    connected.
+    This is the paper's case. They are at most 60 m wide and 200,000, a drone's of a large house,
+    nine tenths of them connected.
     """
     if len(xy) > SINGLE_POINTS or np.ptp(xy, axis=0).max() > SINGLE_EXTENT_M:
         return False
@@ -252,10 +249,8 @@ def is_single(xy: np.ndarray) -> bool:
 def is_roofs_only(xyz: np.ndarray) -> bool:
     """Return whether the points (n, 3) are roofs that were cut out beforehand.
 
-    They may be one roof or several, each a group by itself.
-
-    Of several most are known for roofs, and hardly any is none; what has nothing high on it may be
-    either.
+    They may be one roof or several, each a group by itself. Of several most are known for roofs,
+    and hardly any is none; what has nothing high on it may be either.
     """
     if is_single(xyz[:, :2]):
         return is_cut_out(xyz) is not False
@@ -302,10 +297,9 @@ def group_roughly(xy: np.ndarray) -> list[np.ndarray]:
 def connected_groups(xy: np.ndarray, gap_m: float) -> list[np.ndarray]:
     """Return groups of `xy` (n, 2), connected across gaps up to about `gap_m`.
 
-    Groups are ascending indices.
-
-    Occupied cells of half the gap, on the world's own grid, are connected where their centres are
-    at most the gap apart; groups come in the order of their first cell, by rows.
+    Groups are ascending indices. Occupied cells of half the gap, on the world's own grid, are
+    connected where their centres are at most the gap apart; groups come in the order of their first
+    cell, by rows.
     """
     cell_m = gap_m / 2
     cells = np.floor(np.asarray(xy, float)[:, :2] / cell_m).astype(np.int64)

@@ -24,12 +24,10 @@ LARGEST_M2 = 50.0  # surfaces of that size and larger are all alike
 class Surfaces:
     """Points thinned to one a voxel, (v, ...), and their surfaces.
 
-    `voxel` (n,) is the voxel of each point given.
-
-    `neighbours` (v, k) are the nearest voxels, itself first; `roughness_m` (v,) is the residual of
-    the smoothest plane among those through a neighbour's neighbours, `normal` (v, 3) that plane's,
-    `is_smooth` (v,) whether the voxel lies on it, and `extent_m2` (v,) the size of the surface that
-    it belongs to.
+    `voxel` (n,) is the voxel of each point given. `neighbours` (v, k) are the nearest voxels,
+    itself first; `roughness_m` (v,) is the residual of the smoothest plane among those through a
+    neighbour's neighbours, `normal` (v, 3) that plane's, `is_smooth` (v,) whether the voxel lies on
+    it, and `extent_m2` (v,) the size of the surface that it belongs to.
     """
 
     voxel: np.ndarray

@@ -35,10 +35,9 @@ def main() -> None:
 def run_command() -> None:
     """Run the command of the arguments, and return its exit code.
 
-    Errors meant for the user become one line and exit code 2, Ctrl-C exit code 130.
-
-    An error of our own making shows its traceback, passwords masked as in all of the log, and ends
-    with exit code 1.
+    Errors meant for the user become one line and exit code 2, Ctrl-C exit code 130. An error of our
+    own making shows its traceback, passwords masked as in all of the log, and ends with exit code
+    1.
     """
     from .. import log
     from ..compiled import news

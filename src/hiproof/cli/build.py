@@ -28,10 +28,9 @@ def print_schema() -> None:
 def build(parameters: Path, *, out: Path, changes: dict[str, dict[str, Any]] | None = None) -> int:
     """Make all files of a run again from its parameters.jsonl.
 
-    Change the file with any editor or program first: the new files follow it.
-
-    Exit code: 0 all buildings were built, 1 an internal error, 2 some parameters make no valid
-    solid, or unusable input.
+    Change the file with any editor or program first: the new files follow it. Exit code: 0 all
+    buildings were built, 1 an internal error, 2 some parameters make no valid solid, or unusable
+    input.
     """
     from .running import graded_words
 

@@ -29,9 +29,8 @@ def convert(
     """Convert models of a run or of a file to another format.
 
     The models keep their attributes. Models of a run keep their roof parameters too, in formats
-    that have a place for them.
-
-    Exit code: 0 all models were converted, 2 damaged ones were left out, or unusable input.
+    that have a place for them. Exit code: 0 all models were converted, 2 damaged ones were left
+    out, or unusable input.
     """
     from ..evaluate.run import list_run_inputs
     from ..write.files import refuse_overwriting, refuse_run_file

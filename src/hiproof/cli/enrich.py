@@ -27,10 +27,8 @@ def enrich(
     """Add party walls, areas, house types and the sun to the models of a run.
 
     The run's own files stay as they are. A second call replaces the results of the first; run the
-    same command again to resume an interrupted one.
-
-    Exit code: 0 every building with a model has answers, 1 an internal error, 2 some parameters
-    make no valid solid, or unusable input.
+    same command again to resume an interrupted one. Exit code: 0 every building with a model has
+    answers, 1 an internal error, 2 some parameters make no valid solid, or unusable input.
     """
     settings = Settings().replace(changes or {}).enrich
     return enrich_folder(run, out, with_terrain(settings, terrain), jobs)

@@ -23,9 +23,8 @@ def load(
 ) -> int:
     """Load the models of a run into PostGIS tables.
 
-    Loading the same run again replaces it.
-
-    Exit code: 0 all buildings were loaded, 2 damaged ones were left out, or unusable input.
+    Loading the same run again replaces it. Exit code: 0 all buildings were loaded, 2 damaged ones
+    were left out, or unusable input.
     """
     if replace and append:
         raise InputError("expected --replace or --append, got both; leave one out")

@@ -38,10 +38,8 @@ def reconstruct(
 ) -> int:
     """Model the buildings of point clouds as CityGML, CityJSON, parameters and tables.
 
-    Run the same command again to resume an interrupted run.
-
-    Exit code: 0 every building has a model or a reason why not, 1 an internal error, 2 unusable
-    input.
+    Run the same command again to resume an interrupted run. Exit code: 0 every building has a model
+    or a reason why not, 1 an internal error, 2 unusable input.
     """
     from .running import run_request
 
@@ -116,9 +114,8 @@ def refuse_before(settings: Settings) -> None:
 def find_settings_file(*inputs: str | None) -> Path | None:
     """Return the settings file in the folder of any input, None without one.
 
-    The log names it.
-
-    Raises SettingsError where there are two: which of them counts is not to be guessed.
+    The log names it. Raises SettingsError where there are two: which of them counts is not to be
+    guessed.
     """
     from ..read.outlines.overture import is_overture
 

@@ -22,10 +22,8 @@ def report(
     """Write a self-contained HTML page about a run.
 
     It shows a map, quality charts and the 20 worst buildings in 3D. Of an update it shows the 20
-    buildings that changed most, before and after.
-
-    Exit code: 0 all buildings could be read, 2 damaged ones are shown without a model, or unusable
-    input.
+    buildings that changed most, before and after. Exit code: 0 all buildings could be read, 2
+    damaged ones are shown without a model, or unusable input.
     """
     with show_progress("measure"):
         from ..evaluate.report import write_report

@@ -15,9 +15,8 @@ from ..progress import show_progress
 def repro(folder: Path, *, out: Path) -> int:
     """Run a building again on which hiproof failed.
 
-    The result shows whether the failure repeats or is fixed.
-
-    Exit code: 0 the building has an outcome, 1 the failure repeats, 2 the folder cannot be used.
+    The result shows whether the failure repeats or is fixed. Exit code: 0 the building has an
+    outcome, 1 the failure repeats, 2 the folder cannot be used.
     """
     from ..masking import mask
     from ..status import Status

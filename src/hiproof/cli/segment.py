@@ -25,9 +25,8 @@ def segment(
 
     The table holds the roof type of each building. The LAZ has the extra dimensions roof_type
     (number of the type's column in the table, from 1; 0 is no roof), not_roof (a probability) and
-    building (number of the file on the command line, from 1).
-
-    Exit code: 0 all buildings were labelled, 1 some were not, 2 unusable input.
+    building (number of the file on the command line, from 1). Exit code: 0 all buildings were
+    labelled, 1 some were not, 2 unusable input.
     """
     with show_progress("label"):
         from ..segment.files import segment_files

@@ -42,10 +42,8 @@ def view(folder: Path, *, port: int = 0, browser: bool = True) -> None:
 def open_tiles(folder: Path, update: Update = ignore_progress) -> Iterator[Path]:
     """Yield the tiles in a folder, or those of the run in it.
 
-    They are made where they are missing or older than the models.
-
-    Where the folder cannot be written, they are made in a temporary one, which goes when the block
-    ends.
+    They are made where they are missing or older than the models. Where the folder cannot be
+    written, they are made in a temporary one, which goes when the block ends.
     """
     from ..evaluate.models import run_models
     from ..write.meshes.tiles.tileset import TILESET

@@ -148,11 +148,10 @@ def has_edge(edges, items, a, b):
 def node(segments, reach):
     """Return the vertices (n, 2) and edges (e, 2) of an arrangement.
 
-    It is that of `segments` (m, 4), well separated by the `reach` (grid units).
-
-    Earlier segments have the right of way: their end points stay, later ones within reach move onto
-    them. Returns no edges if it does not come to rest (never seen; the bound keeps a broken input
-    from hanging a run).
+    It is that of `segments` (m, 4), well separated by the `reach` (grid units). Earlier segments
+    have the right of way: their end points stay, later ones within reach move onto them. Returns no
+    edges if it does not come to rest (never seen; the bound keeps a broken input from hanging a
+    run).
     """
     r = np.int64(reach) + 1
     xy, count, ends, places = number_ends(segments, reach)
@@ -421,11 +420,8 @@ def covers(soup, soup_start, boxes, k, x, y):
 def active_plane(x, y, soup, soup_start, boxes, planes, plane_start):
     """Return the plane that is active at (x, y).
 
-    It is the highest of the covering pieces' lowest planes.
-
-    UNCOVERED, OUTSIDE the outline.
-
-    Polygon 0 of the soup is the outline, polygon k + 1 the outline of piece k.
+    It is the highest of the covering pieces' lowest planes. UNCOVERED, OUTSIDE the outline. Polygon
+    0 of the soup is the outline, polygon k + 1 the outline of piece k.
     """
     if not covers(soup, soup_start, boxes, 0, x, y):
         return OUTSIDE

@@ -47,9 +47,7 @@ def blocks(
 ) -> Solid | None:
     """Return one solid of blocks that stand side by side over `outlines`.
 
-    Each has its own height.
-
-    None where they make no valid one.
+    Each has its own height. None where they make no valid one.
     """
     whole = shapely.union_all(outlines)
     if whole.geom_type != "Polygon":

@@ -60,10 +60,8 @@ Borders = dict[tuple[Place, Place], Border]
 def building_parts(solid: Solid, planarity_m: float = 0.001) -> tuple[BuildingPart, ...]:
     """Return the parts of a valid `solid`, that of the lowest member first.
 
-    Its roof faces name their roof parts. A solid of one part has none.
-
-    There are none either where a part would not be valid by itself, as where it touches itself at a
-    corner.
+    Its roof faces name their roof parts. A solid of one part has none. There are none either where
+    a part would not be valid by itself, as where it touches itself at a corner.
 
     >>> from hiproof.frames import LocalFrame
     >>> from hiproof.model import Part, Piece, Roof
@@ -91,10 +89,8 @@ def building_parts(solid: Solid, planarity_m: float = 0.001) -> tuple[BuildingPa
 def join_parts(parts: Solid) -> Solid:
     """Join `parts`, building parts over common vertices, into one solid.
 
-    They are the shells into which it was cut.
-
-    Its roof faces come first, in the order in which they stand in `parts`; its walls are not joined
-    along straight stretches.
+    They are the shells into which it was cut. Its roof faces come first, in the order in which they
+    stand in `parts`; its walls are not joined along straight stretches.
     """
     place_of = place_vertices(parts)
     roofs = [index for index, face in enumerate(parts.faces) if face.kind == ROOF]

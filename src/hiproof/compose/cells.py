@@ -48,11 +48,9 @@ def merge_slivers(
 ) -> None:
     """Give every region too small or thin to a neighbour, smallest first, in `label` (f,).
 
-    The neighbour is the one with the longest common border.
-
-    A patch alone comes last, for what lies between it and the region it belongs to may become that
-    region's. One that would carry its plane on to where no roof is around keeps out, unless nobody
-    could see the region.
+    The neighbour is the one with the longest common border. A patch alone comes last, for what lies
+    between it and the region it belongs to may become that region's. One that would carry its plane
+    on to where no roof is around keeps out, unless nobody could see the region.
     """
     sides, length = traced.face.reshape(-1, 2), edge_lengths(xy, edges)
     keeps_out = np.zeros(len(label), bool)
@@ -140,11 +138,10 @@ MAX_EXTENT_M = 50_000.0
 class PlanProblem:
     """A roof in grid units.
 
-    Polygons are soups of edges: polygon 0 is the outline, polygon k + 1 that of piece k.
-
-    `planes` (p, 3) give heights in grid units; `group` (p,) the first plane equal to each within
-    its roof part, `part` (p,) the roof part it belongs to. `patches` are (soup, label) pairs that
-    overrule the height function.
+    Polygons are soups of edges: polygon 0 is the outline, polygon k + 1 that of piece k. `planes`
+    (p, 3) give heights in grid units; `group` (p,) the first plane equal to each within its roof
+    part, `part` (p,) the roof part it belongs to. `patches` are (soup, label) pairs that overrule
+    the height function.
     """
 
     soups: list[np.ndarray]
@@ -159,9 +156,8 @@ class PlanProblem:
 class PlanCells:
     """The plan as labelled edges.
 
-    `xy` (n, 2) are int64 grid units, `edges` (e, 2), and `side` (e, 2) the labels left and right.
-
-    A label is the index of the plane that roofs the cell, OUTSIDE (-1) beyond the outline.
+    `xy` (n, 2) are int64 grid units, `edges` (e, 2), and `side` (e, 2) the labels left and right. A
+    label is the index of the plane that roofs the cell, OUTSIDE (-1) beyond the outline.
     """
 
     xy: np.ndarray

@@ -26,10 +26,8 @@ def split_at_crossings(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[tuple[int, float, float]]]:
     """Split every edge over which the two cells' heights swap order.
 
-    Returns (xy, edges, side, ties).
-
-    A tie (vertex, z low, z high) replaces a split that would fall within reach of a vertex: there
-    the levels become one.
+    Returns (xy, edges, side, ties). A tie (vertex, z low, z high) replaces a split that would fall
+    within reach of a vertex: there the levels become one.
     """
     x, y = np.moveaxis(xy[edges], -1, 0)
     left, right = (heights(planes[side[:, k], None], x, y) for k in (0, 1))
@@ -69,11 +67,10 @@ def move_crossing(
 ) -> tuple[float, float]:
     """Return the grid point for a crossing of the two `planes` (2, 3) beside edge e.
 
-    The crossing is at `place`; the point lies a millimetre aside where there is room.
-
-    On the edge itself rounding would leave it hundredths of a millimetre off the line between its
-    neighbours, and so make a triangle of any slope. It moves along the line on which the planes
-    meet, to where both are nearest the grid.
+    The crossing is at `place`; the point lies a millimetre aside where there is room. On the edge
+    itself rounding would leave it hundredths of a millimetre off the line between its neighbours,
+    and so make a triangle of any slope. It moves along the line on which the planes meet, to where
+    both are nearest the grid.
     """
     gx, gy, _ = planes[0] - planes[1]
     along = xy[edges[e, 1]] - xy[edges[e, 0]]

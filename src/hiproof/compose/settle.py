@@ -61,9 +61,8 @@ def make_pieces(
     """Return the pieces of a part over `outlines`.
 
     They have every plane of its shape, of a saw-tooth the one of the tooth in which they lie. An
-    onion has several over each outline.
-
-    Raises FitError for a type or parameters that make no shape.
+    onion has several over each outline. Raises FitError for a type or parameters that make no
+    shape.
     """
     if kind == "flat":
         planes = np.array([[0.0, 0.0, translation[2]]])

@@ -26,9 +26,8 @@ SETBACK_M = 0.01  # m that a crosswise corner is cut back by; ten times what mak
 class Saddles(Exception):
     """Plan vertices around which the solid is no manifold.
 
-    Levels rise and fall twice around each, or a cell meets itself there.
-
-    `patches` (soup, label) are the cures.
+    Levels rise and fall twice around each, or a cell meets itself there. `patches` (soup, label)
+    are the cures.
     """
 
     def __init__(self, patches: list[tuple[np.ndarray, int]]):
@@ -47,11 +46,10 @@ def raise_shell(
 ) -> Solid:
     """Raise the solid over the plan cells.
 
-    Raises Saddles where the problem needs a patch first, CompositionError where none helps.
-
-    The ground is lowered where needed to stay `clearance_m` under the lowest roof vertex.
-    With `merges_walls`, consecutive walls along a straight stretch of the outline become one.
-    Vertices keep the `reach` (grid units). Patches are wider by the factor `widening`.
+    Raises Saddles where the problem needs a patch first, CompositionError where none helps. The
+    ground is lowered where needed to stay `clearance_m` under the lowest roof vertex. With
+    `merges_walls`, consecutive walls along a straight stretch of the outline become one. Vertices
+    keep the `reach` (grid units). Patches are wider by the factor `widening`.
     """
     planes = problem.planes
     xy, edges, side, ties = split_at_crossings(cells.xy, cells.edges, cells.side, planes, reach)
@@ -158,9 +156,8 @@ def ground_face(
 ) -> Face:
     """Return the GroundSurface.
 
-    It has the walks around the outside, which run counter-clockwise seen from below.
-
-    `skip` are ground vertices in the middle of a straight wall, which nothing else needs.
+    It has the walks around the outside, which run counter-clockwise seen from below. `skip` are
+    ground vertices in the middle of a straight wall, which nothing else needs.
     """
     rings = []
     for walk in walks(follow, [current == OUTSIDE for current in label]):
@@ -295,10 +292,8 @@ def cure(sectors: Sectors, radius: float) -> tuple[np.ndarray, int]:
     """Return a patch (soup, label) for a vertex that is no manifold.
 
     It gives the tip of the narrowest peak to the higher neighbour. Raises CompositionError if none
-    mends it.
-
-    Where no levels cross but a cell meets itself, the tip of what lies between its two arms goes to
-    that cell.
+    mends it. Where no levels cross but a cell meets itself, the tip of what lies between its two
+    arms goes to that cell.
     """
     size = len(sectors.level)
     peaks = []

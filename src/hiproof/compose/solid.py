@@ -129,11 +129,9 @@ def terrain_intersection(
 ) -> tuple[np.ndarray, ...]:
     """Return closed lines (m, 3) where the outline's walls meet the terrain.
 
-    There is one a ring, with a vertex at least every `spacing_m`.
-
-    `terrain_height_at` takes (n, 2) and returns (n,) in the outline's frame; where it knows nothing
-    (NaN) the height is that of the ring's other points on average, and `z_floor` if it knows
-    nothing along the whole ring.
+    There is one a ring, with a vertex at least every `spacing_m`. `terrain_height_at` takes (n, 2)
+    and returns (n,) in the outline's frame; where it knows nothing (NaN) the height is that of the
+    ring's other points on average, and `z_floor` if it knows nothing along the whole ring.
 
     >>> line, = terrain_intersection(shapely.box(0, 0, 2, 1), lambda xy: xy[:, 0] * 0.1, 0.0)
     >>> line.shape, line[0].tolist() == line[-1].tolist()

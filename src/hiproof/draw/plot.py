@@ -20,11 +20,10 @@ MOST_PLOT_POINTS = 5000  # points drawn; more make a black patch
 def plot(building: Building, points: np.ndarray | None = None, ax: Any = None) -> Any:
     """Draw the building's solid, and `points`, into matplotlib axes.
 
-    `points` (n, 3) are world metres, and coloured by their height over its roof.
-
-    ax: three-dimensional axes to draw into; made if None. Returns them. Points within 0.2 m of the
-    roof are blue, others red. Raises NoModelError for a building without a model, InputError for
-    points of another shape and where matplotlib (extra `report`) is missing.
+    `points` (n, 3) are world metres, and coloured by their height over its roof. ax:
+    three-dimensional axes to draw into; made if None. Returns them. Points within 0.2 m of the roof
+    are blue, others red. Raises NoModelError for a building without a model, InputError for points
+    of another shape and where matplotlib (extra `report`) is missing.
     """
     model = building.model
     ax = ax if ax is not None else new_axes(choose_turn(building))

@@ -89,9 +89,8 @@ def measures(kind: str) -> list[Measure]:
 def place_measure(name: str, p: dict[str, float], highest: np.ndarray) -> Measure:
     """Return the place of one parameter `name` among all, `p`.
 
-    `highest` (k, 3) are the corners of the roof's ridge or top.
-
-    A parameter that no line is known for is only named, beside the roof.
+    `highest` (k, 3) are the corners of the roof's ridge or top. A parameter that no line is known
+    for is only named, beside the roof.
     """
     u, v, h = p["length"] / 2, p["width"] / 2, p.get("height", 0.0)
     (x0, y0, _), (x1, y1, _) = highest.min(axis=0), highest.max(axis=0)

@@ -30,11 +30,9 @@ def apply_edit(
 ) -> Building:
     """Build `record` (an object of parameters.jsonl) after the edit `requested`.
 
-    requested: {"action": ..., "part": ..., ...}.
-
-    points: world points (n, 3) it is refitted to and measured on, unless a hand still drags
-    (`is_measured` False). settings: those of its run. Raises InputError, FitError or
-    CompositionError, one sentence, for an edit that makes no building.
+    requested: {"action": ..., "part": ..., ...}. points: world points (n, 3) it is refitted to and
+    measured on, unless a hand still drags (`is_measured` False). settings: those of its run. Raises
+    InputError, FitError or CompositionError, one sentence, for an edit that makes no building.
 
     >>> ring = [[-6, -4], [6, -4], [6, 4], [-6, 4], [-6, -4]]
     >>> flat = {"type": "flat", "position": [0, 0, 5], "parameters": {"width": 8, "length": 12}}

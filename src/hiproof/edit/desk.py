@@ -238,9 +238,7 @@ def names_of(row: BuildingRow) -> set[str]:
 def obeyed_by(folder: Path, moved_to: Path | None = None) -> dict[str, dict[str, Any]]:
     """Return the overrides that the run in `folder` used.
 
-    One file then holds them and the edits.
-
-    Where edits were accepted already, these hold them.
+    One file then holds them and the edits. Where edits were accepted already, these hold them.
     """
     record = run_record(folder)
     overrides = (record.get("inputs") or {}).get("overrides")

@@ -40,9 +40,8 @@ class OtherVersion(HiproofError):
 class Edits:
     """The overrides in `folder`, by building.
 
-    A folder without such a file starts with those `obeyed` by its run.
-
-    Raises InputError for a file that cannot be read, or that is a link to elsewhere.
+    A folder without such a file starts with those `obeyed` by its run. Raises InputError for a file
+    that cannot be read, or that is a link to elsewhere.
     """
 
     def __init__(self, folder: Path, obeyed: dict[str, dict[str, Any]] | None = None) -> None:
@@ -73,10 +72,9 @@ class Edits:
     def put(self, id: str, record: dict[str, Any] | None, version: str) -> str:
         """Replace the override of a building, or drop it with None.
 
-        It takes the place of that of `version`. Returns the new version, on disk.
-
-        Raises OtherVersion where the building has another by now, InputError for what is no
-        override, OutputError where the file cannot be written.
+        It takes the place of that of `version`. Returns the new version, on disk. Raises
+        OtherVersion where the building has another by now, InputError for what is no override,
+        OutputError where the file cannot be written.
         """
         if record is not None:
             read_override(record)

@@ -35,9 +35,8 @@ KEPT_TILES, KEPT_BUILDINGS = 3, 64
 class RunPoints:
     """Points of the run in `folder`.
 
-    Its files may have `moved_to` another.
-
-    `missing` is a sentence where they cannot be had, empty otherwise.
+    Its files may have `moved_to` another. `missing` is a sentence where they cannot be had, empty
+    otherwise.
     """
 
     def __init__(self, folder: Path, moved_to: Path | None = None) -> None:

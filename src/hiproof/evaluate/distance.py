@@ -30,9 +30,8 @@ def point_surface_distances(
 ) -> np.ndarray:
     """Return the distance (n,) in metres of `points` (n, 3) to the polygons.
 
-    It is that to the nearest of the bounded `polygons`, all in one frame.
-
-    inf without polygons. Raises InputError for arrays of another shape.
+    It is that to the nearest of the bounded `polygons`, all in one frame. inf without polygons.
+    Raises InputError for arrays of another shape.
 
     >>> square = np.array([[0.0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]])
     >>> point_surface_distances(np.array([[1.0, 1, 3], [5, 1, 4]]), [square]).tolist()

@@ -30,11 +30,10 @@ class RunSurvey:
 class RunInputs:
     """The inputs of a run at their present places.
 
-    An input is None where it was not given or does not exist.
-
-    `surveys` hold the clouds, the newest survey first. `gone` are those of the clouds that are not
-    there, as the run named them. `id_attribute`, `where` and `bbox` say how the run read its
-    footprints: read otherwise, ids may be those of other buildings.
+    An input is None where it was not given or does not exist. `surveys` hold the clouds, the newest
+    survey first. `gone` are those of the clouds that are not there, as the run named them.
+    `id_attribute`, `where` and `bbox` say how the run read its footprints: read otherwise, ids may
+    be those of other buildings.
     """
 
     surveys: tuple[RunSurvey, ...] = ()
@@ -109,9 +108,8 @@ def found_inputs(record: dict[str, Any], moved_to: Path | None = None) -> RunInp
 def list_surveys(record: dict[str, Any], places: list[str | None]) -> tuple[RunSurvey, ...]:
     """Return the surveys of a run.
 
-    Its clouds now lie at `places`, None for those that are gone.
-
-    A run of several surveys names its clouds survey by survey.
+    Its clouds now lie at `places`, None for those that are gone. A run of several surveys names its
+    clouds survey by survey.
     """
     epochs = record.get("epochs") or {"": {"clouds": len(places), **(record.get("update") or {})}}
     result, start = [], 0
@@ -140,12 +138,8 @@ def refuse_other_surveys(record: dict[str, Any]) -> None:
 def locate_input(path: str, started_in: str | None, moved_to: Path | None) -> str | None:
     """Return the present place of a file that a run called `path`.
 
-    The run started in the folder `started_in`.
-
-    Returns None where it does not exist.
-
-    A whole project may have moved, and be worked in as before: so names are also tried as they
-    stand.
+    The run started in the folder `started_in`. Returns None where it does not exist. A whole
+    project may have moved, and be worked in as before: so names are also tried as they stand.
     """
     if is_url(path):
         return path

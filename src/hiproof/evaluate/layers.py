@@ -79,10 +79,9 @@ def find_second_surface(
 ) -> tuple[float, float]:
     """Return the share of points on two surfaces, and the surfaces' distance [m].
 
-    `points` (n, 3) are in the roof's frame. Both are zero where the evidence is not clear.
-
-    Those less than 0.3 m inside the outline do not count, `inner` are the others, where that is
-    known. The distance is the median of the cells'.
+    `points` (n, 3) are in the roof's frame. Both are zero where the evidence is not clear. Those
+    less than 0.3 m inside the outline do not count, `inner` are the others, where that is known.
+    The distance is the median of the cells'.
     """
     inner = inner or well_inside(points, roof.outline)
     points = points.compress(inner.holds, axis=0)
@@ -110,10 +109,9 @@ def split_cells(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Split the `values` (n,) in each plan cell into lower and higher ones.
 
-    Values are at `xy` (n, 2 or 3). The split has the least variance within its two groups.
-
-    Returns by cell (m,): how many values, how many in the lesser group, the distance of the groups'
-    means, and the share of the variance that is within the groups (1 where all values are one).
+    Values are at `xy` (n, 2 or 3). The split has the least variance within its two groups. Returns
+    by cell (m,): how many values, how many in the lesser group, the distance of the groups' means,
+    and the share of the variance that is within the groups (1 where all values are one).
     """
     column, row = (
         np.floor((along - along.min()) / cell_m).astype(np.int64) for along in xy[:, :2].T

@@ -156,9 +156,7 @@ def compute_share_within_20cm(dz: np.ndarray, inner: Inner) -> float:
 def percentile(values: np.ndarray, share: float) -> float:
     """Return the level that `share` of `values` (n,) lie below.
 
-    It is linear between two values.
-
-    NumPy's own takes ten times as long.
+    It is linear between two values. NumPy's own takes ten times as long.
     """
     place = share * (len(values) - 1)
     lower = int(place)
@@ -171,9 +169,7 @@ def percentile(values: np.ndarray, share: float) -> float:
 def nodata_share(xy: np.ndarray, outline: shapely.Polygon) -> float:
     """Return the share of 1 m cells in `outline` without points.
 
-    Cells count whose centre is in the outline. `xy` is (n, 2 or 3).
-
-    It is NaN without cells.
+    Cells count whose centre is in the outline. `xy` is (n, 2 or 3). It is NaN without cells.
     """
     west, south, east, north = np.array(outline.bounds) / CELL_M
     west, south = math.floor(west), math.floor(south)

@@ -77,10 +77,9 @@ def building_pictures(
 ) -> str:
     """Draw the model with its points from above at an angle, and from the side.
 
-    Points (n, 3) are coloured by their distances (n,).
-
-    The side view looks along the level direction of the largest roof face, so that slopes show as
-    lines. Roofs have the colour of their part's type, by number in `part_types`.
+    Points (n, 3) are coloured by their distances (n,). The side view looks along the level
+    direction of the largest roof face, so that slopes show as lines. Roofs have the colour of their
+    part's type, by number in `part_types`.
     """
     if len(points) > MOST_PICTURE_POINTS:
         keep = np.linspace(0, len(points) - 1, MOST_PICTURE_POINTS).astype(int)

@@ -70,10 +70,8 @@ RECORD: dict[tuple[str, ...], Any] = {
 class EvaluatedRun:
     """Models in the run's order, with their points and figures.
 
-    Points (n, 3) are in world metres; `record` is run.json.
-
-    `footprints` are plan polygons in world metres, None where a building has none; `clouds` the
-    files measured against.
+    Points (n, 3) are in world metres; `record` is run.json. `footprints` are plan polygons in world
+    metres, None where a building has none; `clouds` the files measured against.
     """
 
     models: tuple[BuildingModel, ...]

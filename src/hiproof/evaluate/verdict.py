@@ -110,10 +110,8 @@ class Verdict(NamedTuple):
 def judge_model(model: Model, points: np.ndarray, unused: np.ndarray | None = None) -> Verdict:
     """Return the verdict on a model by its `points` (n, 3) inside the outline.
 
-    They are in the frame of its roof.
-
-    `unused` (m, 3) are further points that were thinned out or called noise. They count where they
-    lie together off the roof.
+    They are in the frame of its roof. `unused` (m, 3) are further points that were thinned out or
+    called noise. They count where they lie together off the roof.
     """
     return judge_evidence(
         collect_evidence(model, points, np.zeros((0, 3)) if unused is None else unused)

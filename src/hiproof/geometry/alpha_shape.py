@@ -33,9 +33,7 @@ def alpha_shape(
     """Return the outline of points `xy` (n, 2) by the alpha shape.
 
     The outline is the largest component of the alpha shape of `radius` metres, with its holes
-    filled or kept.
-
-    Raises FitError for points that span no area.
+    filled or kept. Raises FitError for points that span no area.
 
     >>> grid = np.stack(np.meshgrid(np.arange(5.0), np.arange(3.0)), axis=-1).reshape(-1, 2)
     >>> alpha_shape(grid, 1.0).area

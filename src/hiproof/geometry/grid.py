@@ -12,10 +12,9 @@ MOST_CELLS_A_POINT = 16  # beyond it sorting is cheaper than a table of all cell
 def number_cells(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Number the distinct cells among `cells` (n, 2), by column, then by row.
 
-    Cells are pairs of whole numbers.
-
-    Returns the distinct cells (k, 2), int64, and the number (n,) of each of the `cells`. It is
-    `np.unique(cells, axis=0)`, which compares rows and takes ten times as long.
+    Cells are pairs of whole numbers. Returns the distinct cells (k, 2), int64, and the number (n,)
+    of each of the `cells`. It is `np.unique(cells, axis=0)`, which compares rows and takes ten
+    times as long.
 
     >>> number_cells(np.array([[2, 5], [-1, 7], [2, 5], [2, 4]]))
     (array([[-1,  7],

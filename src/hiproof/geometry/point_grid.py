@@ -94,9 +94,8 @@ class PointGrid:
 def grow_polygon(polygon: shapely.Polygon, distance_m: float, **options: int) -> shapely.Geometry:
     """Return the area at most `distance_m` from a polygon, the polygon included.
 
-    A polygon with MANY_VERTICES grows to within a tenth of the distance.
-
-    Small teeth that grow by much take GEOS the square of their number.
+    A polygon with MANY_VERTICES grows to within a tenth of the distance. Small teeth that grow by
+    much take GEOS the square of their number.
     """
     if shapely.get_num_coordinates(polygon) > MANY_VERTICES:
         polygon = shapely.simplify(polygon, distance_m / 10)

@@ -15,10 +15,9 @@ MOST_OWN_CORNERS = 200  # Of more, shapely is faster: it looks only at those nea
 def flips(x0, y0, x1, y1, x, y):
     """Return whether an edge crosses the ray from (x, y) towards larger x.
 
-    The edge runs from (x0, y0) to (x1, y1).
-
-    A point is inside those rings of whose edges an odd number do; on a shared edge it is on one
-    side only. Without a branch or a division, the processor looks at several points at once.
+    The edge runs from (x0, y0) to (x1, y1). A point is inside those rings of whose edges an odd
+    number do; on a shared edge it is on one side only. Without a branch or a division, the
+    processor looks at several points at once.
     """
     turn = (x - x0) * (y1 - y0) - (y - y0) * (x1 - x0)
     is_left = ((turn < 0.0) & (y1 > y0)) | ((turn > 0.0) & (y1 < y0))

@@ -31,10 +31,9 @@ def thin_to_grid(xyz: np.ndarray, cell_m: float) -> np.ndarray:
 def thin_to_count(xyz: np.ndarray, limit: int) -> np.ndarray:
     """Keep at most `limit` of the points (n, 3), in their order.
 
-    They are those whose coordinates have the lowest hashes.
-
-    A hash is as good as a draw, so density falls evenly, but it depends on the point alone: the
-    same set of points leaves the same ones, however it was cut and whatever order it came in.
+    They are those whose coordinates have the lowest hashes. A hash is as good as a draw, so density
+    falls evenly, but it depends on the point alone: the same set of points leaves the same ones,
+    however it was cut and whatever order it came in.
     """
     if len(xyz) <= limit:
         return xyz

@@ -67,10 +67,8 @@ class Simulated:
 class Scanned:
     """Solids of a CityJSON file with a roofType, under the same scanner.
 
-    Types are drawn evenly, then their shapes.
-
-    Training never sees the buildings held out for validation and test (a share by the hash of the
-    building's id).
+    Types are drawn evenly, then their shapes. Training never sees the buildings held out for
+    validation and test (a share by the hash of the building's id).
     """
 
     types: tuple[str, ...]
@@ -143,12 +141,9 @@ def as_sample(cloud: Scan, types: tuple[str, ...], type: int, rng: np.random.Gen
 def open_source(data: str | list[str], types: tuple[str, ...] = (), seed: int = 1) -> Source:
     """Open the source or sources that `data` names.
 
-    Names are "simulated", "denhaag:FILE" or "roofn3d:DIR".
-
-    `types` empty means all planar ones of whole roofs. Curved ones are simulated where they are
-    named.
-
-    Raises InputError for names, types or files that cannot be used.
+    Names are "simulated", "denhaag:FILE" or "roofn3d:DIR". `types` empty means all planar ones of
+    whole roofs. Curved ones are simulated where they are named. Raises InputError for names, types
+    or files that cannot be used.
     """
     known = (*ROOF_TYPES, *CURVED_TYPES)
     unknown = [name for name in types if name not in known]
@@ -213,9 +208,8 @@ class Shape:
 def read_shapes(path: Path) -> list[Shape]:
     """Read the solids of a CityJSON file with a known roofType.
 
-    They have 12 m2 or more of ground.
-
-    All parts of a building are held out together. Raises InputError for a file that is no CityJSON.
+    They have 12 m2 or more of ground. All parts of a building are held out together. Raises
+    InputError for a file that is no CityJSON.
     """
     solids = dict(read_solids(path))
     objects = {name: item for feature in features(path) for name, item in feature.objects.items()}

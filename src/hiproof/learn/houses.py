@@ -27,10 +27,8 @@ OVERLAP_M = 0.05  # m that an annex reaches into the house, so that no gap opens
 def training_house(rng: np.random.Generator, type: str, annex_share: float) -> SimBuilding:
     """Draw a building of roof `type`: small, long, low or cut as real ones are.
 
-    A party wall may cut it.
-
-    `annex_share` of them have one or two smaller parts (porch, extension, cross wing) at their
-    sides. The type stays the main roof's.
+    A party wall may cut it. `annex_share` of them have one or two smaller parts (porch, extension,
+    cross wing) at their sides. The type stays the main roof's.
     """
     building = random_building(rng, type)
     main = building.roof.parts[0]

@@ -50,12 +50,11 @@ class Dense(nn.Module):
 class SetAbstraction(nn.Module):
     """PointNet over each group: two layers, then the maximum.
 
-    The layers take features and relative position / radius.
-
-    The first layer is linear in the neighbour's features and in the difference of positions, so it
-    is evaluated once a source and once a centre and subtracted after grouping: the same numbers for
-    a tenth of the products. Its inputs are normalised already, so only the second layer is, after
-    the maximum, where the rows are few.
+    The layers take features and relative position / radius. The first layer is linear in the
+    neighbour's features and in the difference of positions, so it is evaluated once a source and
+    once a centre and subtracted after grouping: the same numbers for a tenth of the products. Its
+    inputs are normalised already, so only the second layer is, after the maximum, where the rows
+    are few.
     """
 
     def __init__(self, inputs: int, hidden: int, outputs: int):
@@ -75,10 +74,8 @@ class SetAbstraction(nn.Module):
 class FeaturePropagation(nn.Module):
     """Coarse features interpolated at finer points, through a layer.
 
-    They are joined with the fine ones.
-
-    The layer's coarse half is applied before interpolation, with which it commutes and where the
-    rows are few.
+    They are joined with the fine ones. The layer's coarse half is applied before interpolation,
+    with which it commutes and where the rows are few.
     """
 
     def __init__(self, coarse: int, fine: int, outputs: int):
@@ -140,9 +137,8 @@ class RoofNetwork(nn.Module):
     ):
         """Compute the logits; see `segment.arrange.Arrangement`.
 
-        `features` (B N, 11), indices into flat rows, `radii` (B, 3).
-
-        Returns point logits (B N, types + 1) and type logits (B, types).
+        `features` (B N, 11), indices into flat rows, `radii` (B, 3). Returns point logits (B N,
+        types + 1) and type logits (B, types).
         """
         sizes = (self.settings.layout.points, *self.settings.layout.levels)
         levels, position = [features], features[:, :3] * self.metres

@@ -34,9 +34,8 @@ from .sample import TRAINING, VALIDATION, AugmentSettings, Sample, Source, symme
 class TrainSettings:
     """The settings of training.
 
-    `samples` clouds are shown in all, each made one `views` times, `epoch` between validations.
-
-    A validation takes `validation` clouds. `rate` and `decay` are AdamW's, the rate rises over the
+    `samples` clouds are shown in all, each made one `views` times, `epoch` between validations. A
+    validation takes `validation` clouds. `rate` and `decay` are AdamW's, the rate rises over the
     share `warm_up` and falls as a cosine; `average` is the running average's memory a step. `start`
     names an ONNX file of this kind whose weights to begin with, such as the shipped one, instead of
     random ones.
@@ -157,9 +156,8 @@ class Trainer:
     def batches(self):
         """Yield the epoch's batches.
 
-        Fresh clouds come first, then the same again in another order and other symmetries.
-
-        A last batch of a single cloud is left out: it has no statistics to normalise by.
+        Fresh clouds come first, then the same again in another order and other symmetries. A last
+        batch of a single cloud is left out: it has no statistics to normalise by.
         """
         settings = self.settings
         new_items = settings.epoch // settings.views

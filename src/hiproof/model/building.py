@@ -68,12 +68,10 @@ class Quality:
 class Model:
     """The model of a building: its `roof` in a local frame, and its `solid`.
 
-    The solid stands in world coordinates.
-
-    `compose` says how, None for the defaults: a changed building is composed as it was.
-    `underside` says how the solid ends below. Where that is not one level, `level_solid` is the
-    solid that does stand on one. `installations` stand on the roof. `eaves` tells how far
-    the roof reaches beyond the walls, None where nobody asked.
+    The solid stands in world coordinates. `compose` says how, None for the defaults: a changed
+    building is composed as it was. `underside` says how the solid ends below. Where that is not one
+    level, `level_solid` is the solid that does stand on one. `installations` stand on the roof.
+    `eaves` tells how far the roof reaches beyond the walls, None where nobody asked.
     """
 
     roof: Roof
@@ -247,9 +245,7 @@ class Building:
     def without_part(self, index: int) -> Building:
         """Return the building without part `index`.
 
-        The part beside it roofs what this part alone roofed.
-
-        Raises as `with_part`.
+        The part beside it roofs what this part alone roofed. Raises as `with_part`.
         """
         return METHODS["without_part"](self, index)
 
@@ -258,11 +254,10 @@ class Building:
     ) -> Building:
         """Fit the heights, pitches and inner lengths of all parts to `points` again.
 
-        `points` (n, 3) are in world metres. Returns a new building.
-
-        Types, rectangles and what `fixed` names (parameters by part, "z" the position's height)
-        stay as they are. The quality and grade are measured on the points. Raises FitError for
-        fewer than three points inside the outline.
+        `points` (n, 3) are in world metres. Returns a new building. Types, rectangles and what
+        `fixed` names (parameters by part, "z" the position's height) stay as they are. The quality
+        and grade are measured on the points. Raises FitError for fewer than three points inside the
+        outline.
         """
         return METHODS["refit"](self, points, fixed)
 

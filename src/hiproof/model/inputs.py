@@ -16,10 +16,8 @@ from ..frames import METRES, Units
 class PointCloud:
     """Points of one or several files, in world metres.
 
-    `xyz` is (n, 3), `classification` (n,) or None, `crs` a pyproj CRS or None.
-
-    World metres are the files' coordinates times their units, `units`: of a CRS in feet they are
-    not its coordinates.
+    `xyz` is (n, 3), `classification` (n,) or None, `crs` a pyproj CRS or None. World metres are the
+    files' coordinates times their units, `units`: of a CRS in feet they are not its coordinates.
     """
 
     xyz: np.ndarray
@@ -62,11 +60,9 @@ def as_xyz(points: Any) -> np.ndarray:
 class Footprint:
     """One requested building: its plan polygon and what the user knows of it.
 
-    The polygon is in world coordinates, and empty if it is unusable.
-
-    `shift` (x, y in m) is how far it lies beside its roof where that is known; (0, 0) where it is
-    not. `passages` lead through below the building: polygons in world coordinates, each with its
-    clearance over the ground (m).
+    The polygon is in world coordinates, and empty if it is unusable. `shift` (x, y in m) is how far
+    it lies beside its roof where that is known; (0, 0) where it is not. `passages` lead through
+    below the building: polygons in world coordinates, each with its clearance over the ground (m).
     """
 
     id: str

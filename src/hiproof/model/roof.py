@@ -38,11 +38,10 @@ class Piece:
 class Part:
     """One primitive of a roof: its type, its parameters and its pieces.
 
-    The type is a name of the catalogue, or "free".
-
-    `parameters` are theta_p by name (metres), `kappa` the rotation about Z (rad), `translation` T_L
-    (3,) in the roof's local frame, `sigma` the standard deviation by parameter name. A saw-tooth
-    has a piece a tooth, and an onion several over one outline; all others have one.
+    The type is a name of the catalogue, or "free". `parameters` are theta_p by name (metres),
+    `kappa` the rotation about Z (rad), `translation` T_L (3,) in the roof's local frame, `sigma`
+    the standard deviation by parameter name. A saw-tooth has a piece a tooth, and an onion several
+    over one outline; all others have one.
     """
 
     type: str

@@ -75,9 +75,8 @@ def find_ground_height(building: Building, figures: RoofFigures | None) -> float
 def roof_figures(solid: Solid) -> RoofFigures:
     """Return the figures of `solid`.
 
-    Its vertices are in world metres, its faces oriented outwards.
-
-    Raises ValueError when no face is a RoofSurface.
+    Its vertices are in world metres, its faces oriented outwards. Raises ValueError when no face is
+    a RoofSurface.
 
     >>> from hiproof.model import Face
     >>> xyz = np.array([[x, y, z] for z in (0, 3) for x, y in ((0, 0), (4, 0), (4, 5), (0, 5))],

@@ -17,10 +17,9 @@ CEILING = "OuterCeilingSurface"  # over a passage
 class Face:
     """A planar polygon of a solid: `rings` of vertex indices.
 
-    The outer ring comes first, counter-clockwise when seen from outside.
-
-    `kind` is RoofSurface, WallSurface, GroundSurface or OuterCeilingSurface; `part` the index of
-    the roof part of a RoofSurface, else -1.
+    The outer ring comes first, counter-clockwise when seen from outside. `kind` is RoofSurface,
+    WallSurface, GroundSurface or OuterCeilingSurface; `part` the index of the roof part of a
+    RoofSurface, else -1.
     """
 
     rings: tuple[tuple[int, ...], ...]
@@ -32,10 +31,8 @@ class Face:
 class Solid:
     """A closed shell: `vertices` (n, 3) and `faces` that point outwards.
 
-    A Building's solid is in world coordinates.
-
-    `defects` are (ISO 19107 code, face) of a shell read from a file that its vertices cannot show,
-    such as an open ring.
+    A Building's solid is in world coordinates. `defects` are (ISO 19107 code, face) of a shell read
+    from a file that its vertices cannot show, such as an open ring.
     """
 
     vertices: np.ndarray

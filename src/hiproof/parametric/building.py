@@ -130,7 +130,6 @@ def build(parameters: Mapping[str, Any], compose: ComposeSettings | None = None)
     """Build the building of `parameters`, an object of a parameters.jsonl.
 
     `read_parameters` reads such objects. A run's own parameters give the run's own building.
-
     compose: how solids are composed, as the file's head says. Raises InputError for parameters that
     make no roof and CompositionError for a roof that makes no valid solid; each is one sentence.
 

@@ -31,11 +31,9 @@ def changed_part(part: dict[str, Any], change: dict[str, Any], z_origin: float) 
 
     A change may name `type`, `position` (x, y, z about the origin), `rotation` (degrees),
     `ridge_height` and `eave_height` (world metres, the origin at `z_origin`), `outlines`, and any
-    parameter by name.
-
-    Another type keeps the rectangle, the lowest eave and the ridge's height. A part that moves or
-    whose sides do roofs what its rectangle covers, its own outlines left out. Raises InputError for
-    what contradicts itself.
+    parameter by name. Another type keeps the rectangle, the lowest eave and the ridge's height. A
+    part that moves or whose sides do roofs what its rectangle covers, its own outlines left out.
+    Raises InputError for what contradicts itself.
     """
     change = {name: value for name, value in change.items() if value is not None}
     part = {key: value for key, value in part.items() if key != "sigma"}
@@ -114,9 +112,7 @@ def change_type(part: dict[str, Any], kind: str, sizes: dict[str, float]) -> dic
 def side_by_side(part: dict[str, Any]) -> dict[str, Any]:
     """Return the part with each side's own pitch and eave.
 
-    They replace the catalogue's parameters.
-
-    Raises InputError where it has none.
+    They replace the catalogue's parameters. Raises InputError where it has none.
     """
     parameters = part["parameters"]
     if SIDED & parameters.keys():

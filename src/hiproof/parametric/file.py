@@ -45,10 +45,8 @@ def opened_parameters(
 ) -> Iterator[tuple[FileHead, Iterator[dict[str, Any]]]]:
     """Yield the head of the parameters.jsonl at `path`, and its buildings.
 
-    Buildings come one by one.
-
-    A line that cannot be read is told to `damaged`, which refuses the file by default, and comes as
-    DAMAGED. Raises InputError for a file that is no parameters.jsonl.
+    Buildings come one by one. A line that cannot be read is told to `damaged`, which refuses the
+    file by default, and comes as DAMAGED. Raises InputError for a file that is no parameters.jsonl.
     """
     try:
         # Editors may begin it with a mark of the encoding.

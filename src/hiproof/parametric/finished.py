@@ -76,12 +76,11 @@ class Run:
 def open_run(path: str | os.PathLike[str], crs: Any = None) -> Run:
     """Open the models of a run's folder, or of a file.
 
-    A file is parameters.jsonl, CityJSON, CityJSONSeq or CityGML.
-
-    `crs` (anything pyproj understands) replaces the CRS that they name. Buildings are read when you
-    iterate over the run, so that one is in memory at a time. Those of a parameters.jsonl, which
-    every run has, are composed again and have parts with parameters; others have a solid alone.
-    Raises InputError for what holds no models.
+    A file is parameters.jsonl, CityJSON, CityJSONSeq or CityGML. `crs` (anything pyproj
+    understands) replaces the CRS that they name. Buildings are read when you iterate over the run,
+    so that one is in memory at a time. Those of a parameters.jsonl, which every run has, are
+    composed again and have parts with parameters; others have a solid alone. Raises InputError for
+    what holds no models.
     """
     path = Path(path)
     record = run_record(path) if path.is_dir() else {}

@@ -302,9 +302,8 @@ def build_given(
 ) -> Building:
     """Return the building of the given parts or block.
 
-    `given` is its footprint with passages.
-
-    It is measured on its points where there are any, and its footprint is moved as a run moves it.
+    `given` is its footprint with passages. It is measured on its points where there are any, and
+    its footprint is moved as a run moves it.
     """
     building, footprint, of_footprint = align_footprint(building, points, settings)
     points, outline, status = usable(points, footprint)

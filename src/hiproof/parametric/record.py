@@ -46,9 +46,8 @@ RESIDUALS = ("psd_mean", "psd_std", "rmse", "p95", "share_within_20cm", "outline
 def read_building(record: Mapping[str, Any]) -> tuple[Building, Roof | None]:
     """Read the building of a JSON object, without a model, and its roof.
 
-    The roof is made of its parts, None where it has none.
-
-    Raises InputError, one sentence, for an object that makes none.
+    The roof is made of its parts, None where it has none. Raises InputError, one sentence, for an
+    object that makes none.
     """
     refuse_other_keys(record, "building", "the building")
     parts = list_at(record, "parts")

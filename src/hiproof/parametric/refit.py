@@ -85,9 +85,7 @@ def refit_parts(
 ) -> list[Any]:
     """Fit the objects `parts`, of which `roof` was made, to `points` (n, 3).
 
-    Points are about the roof's origin.
-
-    Raises FitError for fewer than three.
+    Points are about the roof's origin. Raises FitError for fewer than three.
     """
     unknowns = list_unknowns(roof.parts, fixed)
     if len(points) < FEWEST_REFIT_POINTS:

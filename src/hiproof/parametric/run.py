@@ -89,12 +89,11 @@ def build_file(
 ) -> Built:
     """Write a run's files into the folder `out` from a parameters.jsonl.
 
-    That file is `path`; that of an update gives changes.csv and changes.gpkg, too.
-
-    What is written is as the file's head says, but for `changes` of the settings [write]. A
-    building that cannot be built is written without a model, with a sentence, and keeps its
-    parameters. Raises InputError for a file that cannot be read and OutputError for a folder that
-    cannot be written; then nothing is written.
+    That file is `path`; that of an update gives changes.csv and changes.gpkg, too. What is written
+    is as the file's head says, but for `changes` of the settings [write]. A building that cannot be
+    built is written without a model, with a sentence, and keeps its parameters. Raises InputError
+    for a file that cannot be read and OutputError for a folder that cannot be written; then nothing
+    is written.
     """
     path, out, built = Path(path), Path(out), Built()
     if (out / ".hiproof").exists():  # that command would make all its files again

@@ -118,9 +118,8 @@ def join_knots(knots: list[float], heights: list[Formula]) -> ChordProfile:
 def draw_profile(around_axis: bool, splits: int = 1) -> ChordProfile:
     """Draw a vault's profile in chords, `around_axis` or along a ridge.
 
-    Each of four chords is split into so many.
-
-    With k = q1 the height over the half width V, the profile at the share r of the radius is
+    Each of four chords is split into so many. With k = q1 the height over the half width V, the
+    profile at the share r of the radius is
 
         z = k V ((1 - k^2) (1 - r^2) + k^2 sqrt(1 - r^2))
 

@@ -374,11 +374,10 @@ class Member:
     ) -> Part:
         """Return a part of this shape that roofs `outlines`.
 
-        It is in the frame of `kappa` and `centre`, and called `name` if that is its kin.
-
-        This member must be its canonical one; `changes` are, in the same direction, several: this
-        one after independent changes of one standard deviation each. The last of them, `untold`,
-        are changes that nothing tells: parameters that these change have no deviation.
+        It is in the frame of `kappa` and `centre`, and called `name` if that is its kin. This
+        member must be its canonical one; `changes` are, in the same direction, several: this one
+        after independent changes of one standard deviation each. The last of them, `untold`, are
+        changes that nothing tells: parameters that these change have no deviation.
         """
         as_catalogue = name in (None, self.name)
         words = self.in_words(as_catalogue)
@@ -435,9 +434,8 @@ def compute_planes(
 ) -> np.ndarray:
     """Return the planes (k, 3) over x, y of a roof type with its parameters.
 
-    This is the inverse of `Member.describe`.
-
-    Raises FitError for a name that is no type or parameters that are not its own.
+    This is the inverse of `Member.describe`. Raises FitError for a name that is no type or
+    parameters that are not its own.
 
     >>> compute_planes("monopitch", {"width": 4.0, "length": 9.0, "height": 2.0}, 0.0,
     ...     np.array([0.0,

@@ -49,9 +49,7 @@ def is_plausible(xyz: np.ndarray) -> np.ndarray:
 def compute_bounds(xyz: np.ndarray) -> np.ndarray:
     """Return the lowest and highest coordinates (2, 3) of points (n, 3), n > 0.
 
-    NaN where one is.
-
-    A column at a time, a ninth of the time that `xyz.min(axis=0)` takes.
+    NaN where one is. A column at a time, a ninth of the time that `xyz.min(axis=0)` takes.
 
     >>> compute_bounds(np.array([[3.0, 4.0, 0.0], [1.0, 9.0, 0.0]])).tolist()
     [[1.0, 4.0, 0.0], [3.0, 9.0, 0.0]]

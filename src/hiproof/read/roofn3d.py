@@ -48,10 +48,8 @@ class RoofN3DRecord:
 def read_roofn3d(path: str | Path) -> Iterator[RoofN3DRecord]:
     """Yield the buildings of `roofn3d_buildings.csv`, each id once.
 
-    The first row of an id counts. One row is in memory at a time.
-
-    Raises InputError for a file of another layout and for coordinates that are no numbers, naming
-    the row.
+    The first row of an id counts. One row is in memory at a time. Raises InputError for a file of
+    another layout and for coordinates that are no numbers, naming the row.
     """
     visited: set[str] = set()
     repeated = 0
@@ -78,11 +76,10 @@ def read_roofn3d_labels(
 ) -> Iterator[tuple[RoofN3DRecord, np.ndarray]]:
     """Yield each record with its points' labels (n,).
 
-    A label is the number of a surface (0, 1, ...), -1 where no surface has the point.
-
-    `path` is `roofn3d_surfacegrowing.csv`; it has no label per point, so points are matched by
-    their coordinates, to the millimetre. Surfaces count in the order of the file. Only where the
-    surfaces lie in the file is kept in memory.
+    A label is the number of a surface (0, 1, ...), -1 where no surface has the point. `path` is
+    `roofn3d_surfacegrowing.csv`; it has no label per point, so points are matched by their
+    coordinates, to the millimetre. Surfaces count in the order of the file. Only where the surfaces
+    lie in the file is kept in memory.
     """
     offsets = surface_offsets(path)
     with open(path, "rb") as file:
@@ -152,9 +149,7 @@ def naming_row(path: str | Path, number: int) -> Iterator[None]:
 def coordinates(wkt: str) -> np.ndarray:
     """Return points (n, 3) of `MULTIPOINT Z (x y z,x y z,...)`.
 
-    Inner parentheses are optional.
-
-    An empty field gives (0, 3).
+    Inner parentheses are optional. An empty field gives (0, 3).
 
     >>> coordinates("MULTIPOINT Z (1 2 3,4 5 6.5)").tolist()
     [[1.0, 2.0, 3.0], [4.0, 5.0, 6.5]]

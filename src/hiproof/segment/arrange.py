@@ -29,12 +29,11 @@ class Layout:
 class Arrangement:
     """One cloud in the network's form.
 
-    There are N points, level sizes S1, S2, S3, and K neighbours.
-
-    `chosen` (N,) indices into the cloud, repeated where it has fewer than N points; `features` (N,
-    11) float32; `groups` per level (S, K) indices into the level above; `radii` (3,) metres;
-    `up_indices`, `up_weights` (S1, 3) into level 3 and (N, 3) into level 1: inverse-distance
-    interpolation; `sampled` the number of distinct points.
+    There are N points, level sizes S1, S2, S3, and K neighbours. `chosen` (N,) indices into the
+    cloud, repeated where it has fewer than N points; `features` (N, 11) float32; `groups` per level
+    (S, K) indices into the level above; `radii` (3,) metres; `up_indices`, `up_weights` (S1, 3)
+    into level 3 and (N, 3) into level 1: inverse-distance interpolation; `sampled` the number of
+    distinct points.
     """
 
     select: np.ndarray

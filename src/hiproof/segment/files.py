@@ -21,10 +21,8 @@ def segment_files(clouds: list[Path], out: Path, settings: Settings) -> dict[Pat
     """Label each cloud of `clouds` as one building.
 
     Points go to `out` (LAZ or LAS) and types to a CSV of the same name. Returns why, by file, where
-    a building could not be labelled.
-
-    Raises InputError if none could, and for weights that cannot be used; OutputError if `out`
-    cannot be written.
+    a building could not be labelled. Raises InputError if none could, and for weights that cannot
+    be used; OutputError if `out` cannot be written.
     """
     out = Path(out)
     if out.suffix.lower() not in (".laz", ".las"):

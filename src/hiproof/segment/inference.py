@@ -171,7 +171,6 @@ def carried_back(
     """Carry labels (n,) and probabilities (n,) back to all points `xyz`.
 
     They come from the nearest of the `sampled` points. The probability is that of not-roof.
-
     `probability` (m, types + 1), not-roof last; the mean of the three nearest weighted by inverse
     distance, in pieces, so that memory beyond the result is bounded.
     """

@@ -75,9 +75,8 @@ def combine(
 def log_prior(types: dict[str, float], names: tuple[str, ...] = ()) -> dict[str, float]:
     """Return the natural logarithm of the network's probabilities.
 
-    They are those of `names` (all of `types` by default), bounded below.
-
-    A network may be wrong with confidence; no evidence could undo a prior of zero.
+    They are those of `names` (all of `types` by default), bounded below. A network may be wrong
+    with confidence; no evidence could undo a prior of zero.
     """
     return {
         name: float(np.log(max(find_prior(name, types), SMALLEST_PRIOR)))

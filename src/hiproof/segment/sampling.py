@@ -103,10 +103,8 @@ def local_surfaces(xyz, order, neighbours=SURFACE_NEIGHBOURS):
 
     It follows from the nearest points: the upward normal of their plane (3), the roughness across
     it (m), the point's height above their mean along it (convexity, m), and the plan vector to
-    their mean over their reach (2): long at the cloud's border.
-
-    Points in one place or on a line have no plane: their normal would be a draw of the rounding, so
-    call it vertical.
+    their mean over their reach (2): long at the cloud's border. Points in one place or on a line
+    have no plane: their normal would be a draw of the rounding, so call it vertical.
     """
     places = xyz[order]
     distances, nearest = find_nearest(xyz, places, min(neighbours, len(xyz)))
@@ -131,12 +129,10 @@ def find_nearest(sources, places, count, radius=np.inf):
 def find_canonical_axes(x, y, surface):
     """Return cosine and sine of the building's own direction in plan.
 
-    The direction is in the full circle.
-
-    Up to quarter turns it is the four-fold harmonic of the normals' azimuths (slopes and walls both
-    point along a roof's axes; rough neighbourhoods, trees and edges, count less), re-weighted
-    twice; then its first axis is the one along which the points spread more, and points to the side
-    to which the roof falls more.
+    The direction is in the full circle. Up to quarter turns it is the four-fold harmonic of the
+    normals' azimuths (slopes and walls both point along a roof's axes; rough neighbourhoods, trees
+    and edges, count less), re-weighted twice; then its first axis is the one along which the points
+    spread more, and points to the side to which the roof falls more.
     """
     weight = (surface[:, 0] ** 2 + surface[:, 1] ** 2) * np.exp(-surface[:, 3] / 0.1)
     kappa, _ = find_harmonic(np.arctan2(surface[:, 1], surface[:, 0]), weight)
@@ -167,10 +163,9 @@ def group_points(xyz, centres, sources, count, radius):
     """Group points: the nearest `count` within `radius` of each centre.
 
     Sources are the first `sources` points. Centres are the first `centres`, which repeat from the
-    start where the points end. Returns indices and distances (centres, count).
-
-    Missing neighbours repeat the nearest one, which a maximum over the group does not notice. Every
-    ball must hold a source, as it does where the centres are among them.
+    start where the points end. Returns indices and distances (centres, count). Missing neighbours
+    repeat the nearest one, which a maximum over the group does not notice. Every ball must hold a
+    source, as it does where the centres are among them.
     """
     places = xyz[np.arange(centres) % len(xyz)]
     distances, indices = find_nearest(xyz[:sources], places, count, radius)
@@ -189,10 +184,9 @@ def compute_inverse_shares(distances):
 def thin_to_grid(xyz, count, chunk=500_000):
     """Return the indices of one point a grid cell.
 
-    The cell is chosen so that about `count` or fewer of `xyz` (n, 3) remain.
-
-    Works in pieces of `chunk` points, so that memory beyond the input is bounded. Clouds of `count`
-    points or fewer are kept whole.
+    The cell is chosen so that about `count` or fewer of `xyz` (n, 3) remain. Works in pieces of
+    `chunk` points, so that memory beyond the input is bounded. Clouds of `count` points or fewer
+    are kept whole.
     """
     n = len(xyz)
     if n <= count:

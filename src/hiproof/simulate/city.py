@@ -71,10 +71,8 @@ WORKS = {
 class City:
     """The first `buildings` buildings of the endless city of `seed`.
 
-    They are surveyed at `density` (points/m2).
-
-    Blocks lie in rows of `blocks_a_row`; block (i, j) is the same in every city of that seed,
-    whatever its size.
+    They are surveyed at `density` (points/m2). Blocks lie in rows of `blocks_a_row`; block (i, j)
+    is the same in every city of that seed, whatever its size.
     """
 
     buildings: int
@@ -198,10 +196,9 @@ class Written(NamedTuple):
 def write_city(folder: Path, city: City) -> Iterator[Written]:
     """Write tiles/*.laz, footprints.gpkg and truth.jsonl to `folder`.
 
-    Yields what each tile holds.
-
-    Each building is in footprints and truth once, with the tile its frame's origin lies in. Raises
-    OutputError where the folder cannot be written or already holds a city.
+    Yields what each tile holds. Each building is in footprints and truth once, with the tile its
+    frame's origin lies in. Raises OutputError where the folder cannot be written or already holds a
+    city.
     """
     stock, settings = Stock(city), ScanSettings(density=city.density)
     footprints, truth = folder / "footprints.gpkg", folder / "truth.jsonl"

@@ -62,10 +62,9 @@ def random_compound(
 ) -> SimBuilding:
     """Draw a compound of `kind` on the ground at `origin` (world).
 
-    `kind` is one of COMPOUND_KINDS; it is drawn when None.
-
-    L, L_of_hips, T, cross, extension, two_level and saw_tooth_hall have two parts, U and winged_hip
-    three, a dormered house two to five, a row three to six. Raises InputError for an unknown kind.
+    `kind` is one of COMPOUND_KINDS; it is drawn when None. L, L_of_hips, T, cross, extension,
+    two_level and saw_tooth_hall have two parts, U and winged_hip three, a dormered house two to
+    five, a row three to six. Raises InputError for an unknown kind.
 
     >>> len(random_compound(np.random.default_rng(0), "U").roof.parts)
     3

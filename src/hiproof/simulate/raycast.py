@@ -34,11 +34,9 @@ def cast_convex(
 ) -> None:
     """Raise `z_hit` (n,) to the entry height where a convex body lies above it.
 
-    `face` (n,) gets its side.
-
-    Body b has the rows starts[b]:starts[b+1] of `halfspaces` (k, 4) = (nx, ny, nz, d), and no beam
-    hits it that passes by its disc, `discs` (b, 4) = (x, y, z, radius). Both outputs are changed in
-    place; `face` is a row of `halfspaces`.
+    `face` (n,) gets its side. Body b has the rows starts[b]:starts[b+1] of `halfspaces` (k, 4) =
+    (nx, ny, nz, d), and no beam hits it that passes by its disc, `discs` (b, 4) = (x, y, z,
+    radius). Both outputs are changed in place; `face` is a row of `halfspaces`.
     """
     for body, disc in enumerate(discs):
         near = select_passing(xy0, slope, disc[:3], disc[3])
@@ -66,10 +64,8 @@ def cast_triangles(
 ) -> None:
     """Raise `z_hit` where one of `triangles` (m, 3, 3) lies above it.
 
-    `face` gets the triangle's index.
-
-    Each corner is carried along the beam to z = 0, where the beam is a point: its barycentric
-    weights give the height.
+    `face` gets the triangle's index. Each corner is carried along the beam to z = 0, where the beam
+    is a point: its barycentric weights give the height.
     """
     steepest = np.hypot(*slope.T).max(initial=0.0)
     for number, corners in enumerate(triangles):
@@ -100,11 +96,10 @@ def cast_crowns(
 ) -> None:
     """Raise `z_crown` (n,) to where a tree's crown catches a beam.
 
-    It is caught after `free_path` (n,) metres of leaves.
-
-    `crowns` (t, 5) = (x, y, z of the centre, horizontal and vertical half axes) of upright
-    ellipsoids. A beam whose way through a crown is shorter than its free path comes out below, so
-    the ground and the roof under a tree are thinned, not hidden.
+    It is caught after `free_path` (n,) metres of leaves. `crowns` (t, 5) = (x, y, z of the centre,
+    horizontal and vertical half axes) of upright ellipsoids. A beam whose way through a crown is
+    shorter than its free path comes out below, so the ground and the roof under a tree are thinned,
+    not hidden.
     """
     for *centre, r, h in crowns:
         near = select_passing(xy0, slope, np.array(centre), r + h)
@@ -122,10 +117,9 @@ def cast_crowns(
 def cast_waves(xy0: np.ndarray, slope: np.ndarray, waves: np.ndarray, base: float) -> np.ndarray:
     """Return the heights (n,) at which the beams meet a wavy terrain.
 
-    It is z = base + sum of amplitude sin(kx x + ky y + phase).
-
-    `waves` (w, 4) = (kx, ky, phase, amplitude). Three Newton steps from the base reach far less
-    than a millimetre, as the terrain's slope and curvature are small.
+    It is z = base + sum of amplitude sin(kx x + ky y + phase). `waves` (w, 4) = (kx, ky, phase,
+    amplitude). Three Newton steps from the base reach far less than a millimetre, as the terrain's
+    slope and curvature are small.
     """
     z = np.full(len(xy0), base)
     for _ in range(3):

@@ -120,9 +120,8 @@ def random_building(
 ) -> SimBuilding:
     """Draw a building of one primitive.
 
-    Its ground is at `origin` (world), and it is turned by `kappa` (rad; drawn when None).
-
-    Raises InputError for a type that is not in the catalogue.
+    Its ground is at `origin` (world), and it is turned by `kappa` (rad; drawn when None). Raises
+    InputError for a type that is not in the catalogue.
 
     >>> random_building(np.random.default_rng(0), "hip").type
     'hip'

@@ -93,9 +93,8 @@ def survey(
 ) -> Iterator[Scan]:
     """Yield the points (world) of each of `patches`.
 
-    They are the same whatever else of the town is surveyed.
-
-    `lots` must hold every lot that reaches into the patches.
+    They are the same whatever else of the town is surveyed. `lots` must hold every lot that reaches
+    into the patches.
     """
     lot_bounds = np.array([lot.bounds for lot in lots]).reshape(-1, 4)
     for lower, upper in patches:

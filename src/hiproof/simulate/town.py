@@ -87,11 +87,9 @@ def street_side(
 ) -> list[SimBuilding]:
     """Return buildings side by side along `heading` (rad) from `start` (2,).
 
-    They stand to its left, within `length` by `depth` metres.
-
-    `names` are taken one after the other until the side is full; a building deeper than the plot is
-    turned, and left out where that does not help. Terraced rows come back as their houses half of
-    the time.
+    They stand to its left, within `length` by `depth` metres. `names` are taken one after the other
+    until the side is full; a building deeper than the plot is turned, and left out where that does
+    not help. Terraced rows come back as their houses half of the time.
     """
     along, placed = 0.0, []
     for name in names:

@@ -26,12 +26,11 @@ def training_sample(
 ) -> tuple[np.ndarray, np.ndarray, int]:
     """Scan one building for training.
 
-    Returns points (n, 3) about their mean, labels (n,) and the building's type.
-
-    Labels and type index `types`; a point that is not roof has the label len(types). The density is
-    drawn on a logarithmic scale within `density` and the scanner's noise, beam and margin at
-    random; clouds outside `n_points` (count, lowest and highest) are drawn again, larger ones
-    thinned. `defects` None means all of them.
+    Returns points (n, 3) about their mean, labels (n,) and the building's type. Labels and type
+    index `types`; a point that is not roof has the label len(types). The density is drawn on a
+    logarithmic scale within `density` and the scanner's noise, beam and margin at random; clouds
+    outside `n_points` (count, lowest and highest) are drawn again, larger ones thinned. `defects`
+    None means all of them.
 
     >>> points, labels, type = training_sample(np.random.default_rng(1), ("pyramid", "gable",
     ...     "hip"))

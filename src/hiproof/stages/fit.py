@@ -104,9 +104,8 @@ def fit_one(
 def candidates(recognised: dict[str, float], settings: Settings) -> tuple[str, ...]:
     """Return the types to fit by one primitive, empty for all.
 
-    They are those requested, and by the paper's objective only what the network sees.
-
-    So the paper has it (section 3.1), and a fit by its objective takes half a second a type.
+    They are those requested, and by the paper's objective only what the network sees. So the paper
+    has it (section 3.1), and a fit by its objective takes half a second a type.
 
     >>> paper = Settings.from_dict({"fit": {"objective": "paper"}})
     >>> candidates({"gable": 0.9, "hip": 0.08, "shed": 0.02}, paper)

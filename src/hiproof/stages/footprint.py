@@ -39,7 +39,6 @@ def align_footprint(
     """Shift the footprint onto its points, with a remark.
 
     Points are those in and around it. Returns the building with the shift, and the footprint there.
-
     It stays where it is unless the evidence is clear, or its shift is known. Of thousands of
     vertices it keeps those that matter.
     """

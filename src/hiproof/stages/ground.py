@@ -64,11 +64,10 @@ def find_ground(
 ) -> Ground:
     """Find z_min, and the terrain's line around the outline.
 
-    It is the lowest terrain under the roof's eave vertices (paper section 3.3).
-
-    Where no terrain is known it is assumed as low as a low wall's foot, or as the lowest points of
-    the walls that are seen below `roof`. `walls` are those of the settings: where they follow the
-    terrain, a line of which a part is unknown runs at z_min there.
+    It is the lowest terrain under the roof's eave vertices (paper section 3.3). Where no terrain is
+    known it is assumed as low as a low wall's foot, or as the lowest points of the walls that are
+    seen below `roof`. `walls` are those of the settings: where they follow the terrain, a line of
+    which a part is unknown runs at z_min there.
     """
     from ..compose import terrain_intersection
     from ..compose.settle import PLAN_DIGITS, round_number

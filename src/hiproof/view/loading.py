@@ -22,12 +22,11 @@ def load_postgis(
 ) -> int:
     """Replace a prefix's tables in a database by the models of `folder`.
 
-    They are PREFIX_buildings, PREFIX_roofs and PREFIX_parts of the database at `dsn`.
-
-    `name` is that of the run in the tables, its folder's by default; `how` is `replace` or
-    `append` (see Load). A damaged building is told to `damaged`, which refuses the run by
-    default, and left out. Raises InputError for a folder without models, OutputError for a database
-    that cannot be written or holds another run.
+    They are PREFIX_buildings, PREFIX_roofs and PREFIX_parts of the database at `dsn`. `name` is
+    that of the run in the tables, its folder's by default; `how` is `replace` or `append` (see
+    Load). A damaged building is told to `damaged`, which refuses the run by default, and left out.
+    Raises InputError for a folder without models, OutputError for a database that cannot be written
+    or holds another run.
     """
     run, place = open_run(folder), Path(folder).resolve()
     code = (reference_system(run.head.crs_of_files) or "").rpartition("/")[2]

@@ -113,12 +113,10 @@ def building_attributes(
     """Return a building's attributes by name, in a fixed order.
 
     They are the input's own, roofer's (`prefix`), ours (`hiproof_`), and with `osm` the tags of
-    OpenStreetMap.
-
-    Values are str, int, float, bool or None; what cannot be told is None. Where names clash, what
-    we computed wins. Lengths are metres, `volume` m3, `pt_density` points/m2 also in a file whose
-    coordinates are in other `units`, which `hiproof_units` then says. What each is stands in
-    data/attributes.toml.
+    OpenStreetMap. Values are str, int, float, bool or None; what cannot be told is None. Where
+    names clash, what we computed wins. Lengths are metres, `volume` m3, `pt_density` points/m2 also
+    in a file whose coordinates are in other `units`, which `hiproof_units` then says. What each is
+    stands in data/attributes.toml.
     """
     input_attributes = {
         plain_text(name): plain(value) for name, value in building.attributes.items()

@@ -84,11 +84,9 @@ class OutputFile(io.FileIO):
 def atomic(path: str | os.PathLike) -> Iterator[Path]:
     """Yield a free hidden path beside `path`, which becomes `path`.
 
-    It becomes so when the block ends well, and is removed when not.
-
-    The parent folder is made if missing. Raises OutputError where the place cannot be written,
-    before the block is entered if that can be known, and for the block's own errors when they come
-    from writing the hidden file.
+    It becomes so when the block ends well, and is removed when not. The parent folder is made if
+    missing. Raises OutputError where the place cannot be written, before the block is entered if
+    that can be known, and for the block's own errors when they come from writing the hidden file.
 
     >>> import tempfile
     >>> folder = Path(tempfile.mkdtemp())

@@ -49,12 +49,10 @@ class UniqueNames:
 def srs_name(crs: Any) -> str | None:
     """Return GML's `srsName` of a CRS.
 
-    It is a URN with one EPSG code, or OGC's compound URN.
-
-    None when `crs` is unknown or has no code.
-
-    A URN promises the order of axes that EPSG gives, and coordinates here are east, north: a CRS
-    that counts north first goes by its bare codes, which promise none and are read as east, north.
+    It is a URN with one EPSG code, or OGC's compound URN. None when `crs` is unknown or has no
+    code. A URN promises the order of axes that EPSG gives, and coordinates here are east, north: a
+    CRS that counts north first goes by its bare codes, which promise none and are read as east,
+    north.
 
     >>> srs_name("EPSG:7415")
     'urn:ogc:def:crs,crs:EPSG::28992,crs:EPSG::5709'
@@ -104,11 +102,9 @@ def plan_wkt(crs: Any) -> str | None:
 class FileUnits:
     """Units of coordinates in the files of a run.
 
-    Attributes and parameters are in metres in all of them.
-
-    They are those of the CRS that a file names, so that a reader who knows only the file is right:
-    where CityJSON can name the plan's CRS alone, and in tables, which always do, heights are in the
-    plan's unit.
+    Attributes and parameters are in metres in all of them. They are those of the CRS that a file
+    names, so that a reader who knows only the file is right: where CityJSON can name the plan's CRS
+    alone, and in tables, which always do, heights are in the plan's unit.
     """
 
     gml: Units = METRES
@@ -119,9 +115,8 @@ class FileUnits:
     def of(cls, crs: Any, world_units: Units | None = None, out_crs: str = "") -> FileUnits:
         """Return the units of files of a run in `crs`.
 
-        They are written in `out_crs` where that is one.
-
-        `world_units` are those of coordinates without a CRS, or without a name for it.
+        They are written in `out_crs` where that is one. `world_units` are those of coordinates
+        without a CRS, or without a name for it.
 
         >>> files = FileUnits.of("EPSG:2263+5703")
         >>> str(files.gml), str(files.cityjson), str(files.table)

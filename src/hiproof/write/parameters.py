@@ -38,10 +38,9 @@ def write_parameters(
 ) -> None:
     """Write a head and one JSON object a building to `path`.
 
-    Raises OutputError when it cannot be written.
-
-    What stands in them is listed in docs/attributes.md. All lengths are metres, `origin` too, also
-    where the files' CRS counts in feet; angles are degrees. What cannot be told is null.
+    Raises OutputError when it cannot be written. What stands in them is listed in
+    docs/attributes.md. All lengths are metres, `origin` too, also where the files' CRS counts in
+    feet; angles are degrees. What cannot be told is null.
     """
     ParametersWriter(path, head or FileHead(crs)).add_all(buildings)
 

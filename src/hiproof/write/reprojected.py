@@ -31,10 +31,8 @@ from ..read.crs import (
 class Reprojected(Units):
     """Units of a file, and the way to its CRS from world metres.
 
-    World metres are coordinates of another CRS times their units, `own`.
-
-    `plan_way` takes plans, `height_way` places with their heights, in a unit of `height_m` metres;
-    None where heights stay.
+    World metres are coordinates of another CRS times their units, `own`. `plan_way` takes plans,
+    `height_way` places with their heights, in a unit of `height_m` metres; None where heights stay.
     """
 
     own: Units = METRES
@@ -86,9 +84,8 @@ class Reprojected(Units):
 def choose_file_crs(crs: Any, requested: str) -> Any:
     """Return the CRS in which files of a run in `crs` are written.
 
-    It is the one `requested`, with the run's heights where it names none.
-
-    Raises InputError for one that is no projection, or where the run's is not known.
+    It is the one `requested`, with the run's heights where it names none. Raises InputError for one
+    that is no projection, or where the run's is not known.
 
     >>> describe_crs(choose_file_crs("EPSG:7415", "EPSG:25831"))
     'ETRS89 / UTM zone 31N + NAP height'
@@ -114,9 +111,8 @@ def choose_file_crs(crs: Any, requested: str) -> Any:
 def make_reprojection(crs: Any, out: Any, source_units: Units, units: Units) -> Units:
     """Return the way from world metres of `crs` to a file in `out`.
 
-    World metres have `source_units`; the file is in `units`.
-
-    Raises InputError where pyproj knows none, of heights without a grid that is at hand.
+    World metres have `source_units`; the file is in `units`. Raises InputError where pyproj knows
+    none, of heights without a grid that is at hand.
     """
     crs, out = parse_crs(crs), parse_crs(out)
     heights = has_heights(out) and not same_height_system(crs, out)

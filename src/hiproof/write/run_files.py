@@ -66,10 +66,9 @@ def fragments(
 ) -> tuple[Building, Fragments]:
     """Return one building, and its texts.
 
-    `names` are its CityJSON id and its gml:id.
-
-    They are those of the files that a run writes, `head` what these have in common, the offset of
-    the CityJSON file included. A solid that cannot be measured is left out, as in `write_all`.
+    `names` are its CityJSON id and its gml:id. They are those of the files that a run writes,
+    `head` what these have in common, the offset of the CityJSON file included. A solid that cannot
+    be measured is left out, as in `write_all`.
     """
     building, figures = measure_or_drop_solid(requested)
     attributes = building_attributes(
@@ -83,9 +82,8 @@ def fragments(
 def join_fragments(files: dict[str, Path], parts: Iterable[Fragments], head: FileHead) -> None:
     """Write `files` of a run from `parts`, each whole or not at all.
 
-    They are as `write_all` would write them, without making any text.
-
-    `files` are paths by format, a key of FORMATS. Raises OutputError when one cannot be written.
+    They are as `write_all` would write them, without making any text. `files` are paths by format,
+    a key of FORMATS. Raises OutputError when one cannot be written.
     """
     with ExitStack() as stack:
         opened = [

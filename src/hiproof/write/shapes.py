@@ -42,11 +42,9 @@ class PartShape:
 class Shapes:
     """A building's further geometry, None or empty where there is none.
 
-    There is none where it is not requested.
-
-    `outline` is the solid's ground, which at the height of the eaves, `z_edge`, is the roof's edge
-    of LoD0; `lod12` and `lod13` are blocks; `parts` are two or more, and have blocks of their own
-    in place of `lod13`.
+    There is none where it is not requested. `outline` is the solid's ground, which at the height of
+    the eaves, `z_edge`, is the roof's edge of LoD0; `lod12` and `lod13` are blocks; `parts` are two
+    or more, and have blocks of their own in place of `lod13`.
     """
 
     outline: Face | None = None

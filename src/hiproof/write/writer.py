@@ -24,10 +24,9 @@ from .values import plain_text
 class BuildingWriter(AbstractContextManager["BuildingWriter", bool | None]):
     """Base of the incremental writers.
 
-    Use it as `with Writer(path, ...) as writer: writer.add(building)`.
-
-    The file appears when the block ends well; after an exception nothing is left and an older file
-    stays. A format fills in `begin`, `add`, `put` and `finish`.
+    Use it as `with Writer(path, ...) as writer: writer.add(building)`. The file appears when the
+    block ends well; after an exception nothing is left and an older file stays. A format fills in
+    `begin`, `add`, `put` and `finish`.
     """
 
     file: BinaryIO

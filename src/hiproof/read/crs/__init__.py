@@ -153,9 +153,7 @@ def names_heights_alone(crs: CRS) -> bool:
 def same_horizontal(first: CRS | None, second: CRS | None) -> bool:
     """Return whether plan coordinates mean the same place in both CRSs.
 
-    Heights are ignored.
-
-    An unknown CRS equals nothing.
+    Heights are ignored. An unknown CRS equals nothing.
 
     >>> same_horizontal(CRS("EPSG:7415"), CRS("EPSG:28992"))
     True
@@ -191,11 +189,9 @@ def combine(horizontal: CRS | None, vertical: CRS | None) -> CRS | None:
 def find_units(crs: CRS | None, source: str = "the point clouds", unit_name: str = "auto") -> Units:
     """Return the units of coordinates in `crs`.
 
-    Heights of a CRS without any are taken to be in the plan's unit.
-
-    `unit_name` is a key of NAMED_UNITS for coordinates without a CRS. Raises InputError for a CRS
-    in degrees, and for a name that contradicts the CRS; `source` is what the message calls the
-    coordinates.
+    Heights of a CRS without any are taken to be in the plan's unit. `unit_name` is a key of
+    NAMED_UNITS for coordinates without a CRS. Raises InputError for a CRS in degrees, and for a
+    name that contradicts the CRS; `source` is what the message calls the coordinates.
 
     >>> str(find_units(CRS("EPSG:2263+5703"))), str(find_units(None, unit_name="foot"))
     ('US survey foot, heights in metre', 'foot')
@@ -305,10 +301,8 @@ def make_transformer(source: CRS, target: CRS) -> Transformer:
 def convert_to_degrees(crs: CRS, xy: np.ndarray) -> np.ndarray:
     """Return longitude and latitude (n, 2) of plan positions (n, 2) in `crs`.
 
-    They are NaN where the CRS leaves the place open.
-
-    Those of a projected CRS are of its own datum, up to a kilometre from WGS 84: to look for the
-    operation between the two takes 50 ms.
+    They are NaN where the CRS leaves the place open. Those of a projected CRS are of its own datum,
+    up to a kilometre from WGS 84: to look for the operation between the two takes 50 ms.
     """
     plan = horizontal_crs(crs)
     if not names_place(crs):

@@ -46,10 +46,9 @@ COMPASS = (
 def check_plan_axes(plan: Any, source: str) -> None:
     """Refuse a plan CRS unless its axes are lengths, x to the right of y.
 
-    Both lengths have to be in one unit.
-
-    `source` names the coordinates in the message. Files hold east before north whatever order a CRS
-    declares, so north before east is usual. A local system may be turned, but not mirrored.
+    Both lengths have to be in one unit. `source` names the coordinates in the message. Files hold
+    east before north whatever order a CRS declares, so north before east is usual. A local system
+    may be turned, but not mirrored.
     """
     directions = [axis.direction for axis in plan.axis_info[:2]]
     if len(directions) < 2:

@@ -33,11 +33,10 @@ neighbours' roofs.
 class Operation:
     """An operation of PROJ from the CRS `source` to `target`.
 
-    It is used near `place` (x, y in `source`) for `subject`.
-
-    `accuracy_m` is PROJ's, None where it states none. `missing_grids` are those of the best
-    operation that cannot be used because they are not installed, and `missing_accuracy_m` is its
-    accuracy; empty and None where none is better.
+    It is used near `place` (x, y in `source`) for `subject`. `accuracy_m` is PROJ's, None where it
+    states none. `missing_grids` are those of the best operation that cannot be used because they
+    are not installed, and `missing_accuracy_m` is its accuracy; empty and None where none is
+    better.
     """
 
     subject: str

@@ -50,11 +50,10 @@ def features(
 ) -> Iterator[Feature]:
     """Yield every document of a file, placed by its transform and CRS.
 
-    A line without these has those of the line before.
-
-    `alternative` are the units where no CRS is named, `crs_units` those of one of which more is
-    known than a name tells, if there is one. A feature that cannot be read is told to `damaged` and
-    comes without objects. Raises InputError as `documents` does.
+    A line without these has those of the line before. `alternative` are the units where no CRS is
+    named, `crs_units` those of one of which more is known than a name tells, if there is one. A
+    feature that cannot be read is told to `damaged` and comes without objects. Raises InputError as
+    `documents` does.
     """
     transform, units = None, crs_units or alternative
     first_name, seen_head = None, False
@@ -129,10 +128,9 @@ def explain_error(error: Exception) -> str:
 def documents(path: Path, damaged: Damaged = refuse) -> Iterator[tuple[dict[str, Any], str]]:
     """Yield each document of a file with its place in the file.
 
-    CityJSON has one document. CityJSONSeq (`.jsonl`) has one a line, the header first.
-
-    A line after the header that cannot be read is told to `damaged` and comes as an empty document.
-    Raises InputError for what is no text, no JSON, no object, or of another type.
+    CityJSON has one document. CityJSONSeq (`.jsonl`) has one a line, the header first. A line after
+    the header that cannot be read is told to `damaged` and comes as an empty document. Raises
+    InputError for what is no text, no JSON, no object, or of another type.
     """
     if path.suffix.lower() != ".jsonl":
         document = parse_object(read_text(path), str(path))

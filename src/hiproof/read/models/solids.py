@@ -159,9 +159,8 @@ def citygml_solids(
     """Yield the shells of all solids of a CityGML file, member by member.
 
     City objects of the kind `without` are left out. `crs_units` are the units of its coordinates,
-    by default those of the CRS that it names.
-
-    An object without a gml:Solid gives its boundary surfaces as one shell.
+    by default those of the CRS that it names. An object without a gml:Solid gives its boundary
+    surfaces as one shell.
     """
     from lxml import etree
 

@@ -21,10 +21,8 @@ def restore_declared_types(
 ) -> list[np.ndarray]:
     """Return the `columns` (n,) in their `declared` types, None for no value.
 
-    These are whole numbers and booleans.
-
-    `known_of` reads the values (k,) of one column again, of the features that have one and in their
-    order, for numbers that decimals do not hold.
+    These are whole numbers and booleans. `known_of` reads the values (k,) of one column again, of
+    the features that have one and in their order, for numbers that decimals do not hold.
     """
     whole = []
     for name, kind, column in zip(names, declared, columns, strict=True):

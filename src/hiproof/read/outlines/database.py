@@ -41,10 +41,9 @@ def read_table(
 ) -> tuple[dict[str, Any], np.ndarray, np.ndarray, list[np.ndarray]]:
     """Read the table that a source names, in the shape that pyogrio gives.
 
-    That is metadata (fields, crs), row numbers, geometries and columns.
-
-    `where` is a condition beside the source's own. Raises InputError in a full sentence when the
-    database, the table or the geometry column cannot be used.
+    That is metadata (fields, crs), row numbers, geometries and columns. `where` is a condition
+    beside the source's own. Raises InputError in a full sentence when the database, the table or
+    the geometry column cannot be used.
     """
     with open_source(source, where) as table:
         rows = list(table.rows())

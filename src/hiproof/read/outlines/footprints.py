@@ -143,9 +143,8 @@ def read_features(
 ) -> Features:
     """Read metadata, feature numbers, geometries and columns.
 
-    Metadata are fields and crs. Geometries are shapely's, None where a feature has none.
-
-    Of a file, those around `bbox` in `bbox_crs` are read, and perhaps others.
+    Metadata are fields and crs. Geometries are shapely's, None where a feature has none. Of a file,
+    those around `bbox` in `bbox_crs` are read, and perhaps others.
     """
     remember(str(path))
     if is_database(path):

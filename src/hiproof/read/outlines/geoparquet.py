@@ -49,10 +49,9 @@ def read_parquet(
 ) -> tuple[dict[str, Any], np.ndarray, np.ndarray, list[np.ndarray]]:
     """Read metadata, row numbers, geometries and columns of a file.
 
-    Metadata are fields, crs and total_bounds.
-
-    `box_in` gives the box that rows have to meet, in the file's CRS, None for all rows. `where` is
-    a condition in SQL. Raises InputError where the file or the condition cannot be read.
+    Metadata are fields, crs and total_bounds. `box_in` gives the box that rows have to meet, in the
+    file's CRS, None for all rows. `where` is a condition in SQL. Raises InputError where the file
+    or the condition cannot be read.
     """
     stem = Path(str(path).partition("?")[0]).stem
     if layer not in (None, 0, stem):

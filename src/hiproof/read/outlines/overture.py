@@ -102,9 +102,7 @@ def meets(box: Sequence[float] | None, extent: shapely.Geometry) -> bool:
 def find_asset(item: Document, suffix: str) -> str:
     """Return the address of an item's file whose name ends in `suffix`.
 
-    One by HTTP comes before others.
-
-    Raises InputError where it lists none.
+    One by HTTP comes before others. Raises InputError where it lists none.
     """
     assets = item.content.get("assets") or {}
     ways = [urljoin(item.address, asset.get("href") or "") for asset in assets.values()]
@@ -152,10 +150,9 @@ def read_overture(
 ) -> OvertureFootprints:
     """Read the footprints of a type that meet `extent`.
 
-    `extent` is in longitude and latitude. Buildings under ground are left out.
-
-    `catalogue` is the address of the catalogue of releases, the latest of which is read, or that of
-    one release. Raises InputError where it cannot be read or has no footprints there.
+    `extent` is in longitude and latitude. Buildings under ground are left out. `catalogue` is the
+    address of the catalogue of releases, the latest of which is read, or that of one release.
+    Raises InputError where it cannot be read or has no footprints there.
     """
     import_pyarrow()
     release, collection = find_collection(catalogue, kind)

@@ -28,11 +28,9 @@ def simple_polygons(
 ) -> list[shapely.Polygon]:
     """Return the valid polygons of any geometry, without heights.
 
-    One empty polygon stands for a geometry that encloses no area.
-
-    A self-intersecting polygon is repaired (its holes and loops kept as areas), and slivers of the
-    repair dropped. Polygons that overlap are one, and so are all that touch where they are faces of
-    a body.
+    One empty polygon stands for a geometry that encloses no area. A self-intersecting polygon is
+    repaired (its holes and loops kept as areas), and slivers of the repair dropped. Polygons that
+    overlap are one, and so are all that touch where they are faces of a body.
 
     >>> bow_tie = shapely.Polygon([(0, 0), (4, 4), (4, 0), (0, 4)])
     >>> sorted(p.area for p in simple_polygons(bow_tie))

@@ -36,9 +36,8 @@ def read_layer(
 ) -> tuple[dict[str, Any], np.ndarray, np.ndarray, list[np.ndarray], list[str]]:
     """Read pyogrio's metadata, numbers, WKB and columns of a layer.
 
-    The names of the attributes that were read as text come with them.
-
-    `chosen` are pyogrio's own options that choose among the features.
+    The names of the attributes that were read as text come with them. `chosen` are pyogrio's own
+    options that choose among the features.
     """
     read = partial(
         pyogrio.raw.read, path, layer=layer, return_fids=True, datetime_as_string=True, **chosen
@@ -137,9 +136,8 @@ def find_source(path: str, layer: str | int | None) -> tuple[str, str | int | No
 def virtual_layer(path: str, layer: str, geometry: str = "", text: str = "") -> str:
     """Return GDAL's virtual format of one layer.
 
-    The layer's `geometry` is declared anew, or it has one attribute alone, as text.
-
-    `path` may be what this function made.
+    The layer's `geometry` is declared anew, or it has one attribute alone, as text. `path` may be
+    what this function made.
     """
     if path.startswith("<"):
         root = ElementTree.fromstring(path)
@@ -166,9 +164,8 @@ def read_vector_file(
 ) -> Features:
     """Read pyogrio's metadata, feature numbers, geometries and columns.
 
-    Geometries are shapely's, None where a feature has none.
-
-    `make_box` gives the box to read in the layer's CRS.
+    Geometries are shapely's, None where a feature has none. `make_box` gives the box to read in the
+    layer's CRS.
     """
     source, layer = translate_read_errors(
         lambda: find_source(str(path), choose_layer(path, layer)), path

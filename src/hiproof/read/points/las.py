@@ -185,10 +185,9 @@ def las_chunks(
 ) -> Iterator[Chunk]:
     """Yield the chunks of `path`.
 
-    Of a COPC file with a `box` only the octree's nodes that meet the box are decoded.
-
-    `runs` (k, 2) of points, [first, end), limit what is read of another file. To `noted` go the
-    boxes (k, 4) of the runs of each chunk (runs.py), of all its points.
+    Of a COPC file with a `box` only the octree's nodes that meet the box are decoded. `runs` (k, 2)
+    of points, [first, end), limit what is read of another file. To `noted` go the boxes (k, 4) of
+    the runs of each chunk (runs.py), of all its points.
     """
     if box is not None and is_copc(path):
         yield copc_chunk(path, box)

@@ -145,9 +145,8 @@ def decode_crs(directory: bytes, doubles: bytes = b"", texts: bytes = b"") -> CR
     """Return the CRS of plan and heights that the keys define.
 
     It is that of the heights alone where there is no plan, and None without either. Raises CRSError
-    for keys that cannot be understood.
-
-    Raises CRSError where the keys define one that cannot be understood.
+    for keys that cannot be understood. Raises CRSError where the keys define one that cannot be
+    understood.
     """
     keys = GeoKeys.of(directory, doubles, texts)
     plan, heights = keys.plan(), keys.heights()
@@ -219,9 +218,7 @@ WKT = 2112
 def las_crs(records: dict[int, bytes]) -> CRS | UnknownCRS | None:
     """Return the CRS that the records of user LASF_Projection define, or None.
 
-    Records come by number.
-
-    Heights may come from the keys beside a WKT.
+    Records come by number. Heights may come from the keys beside a WKT.
     """
     text = decode_wkt(records.get(WKT, b""))
     result, faults = [], []

@@ -42,11 +42,9 @@ class Octree(NamedTuple):
 class LasFacts:
     """The fields of the public header block, and the file's `size` in bytes.
 
-    Arrays are (3,): x, y, z.
-
-    `points_end` is the first byte that no point may take: of waveforms, of extended records, or the
-    end. `laszip` is the record that tells how points are compressed; only COPC has an `octree`;
-    `projection` are the records of the CRS.
+    Arrays are (3,): x, y, z. `points_end` is the first byte that no point may take: of waveforms,
+    of extended records, or the end. `laszip` is the record that tells how points are compressed;
+    only COPC has an `octree`; `projection` are the records of the CRS.
     """
 
     size: int
@@ -192,10 +190,8 @@ def iterate_records(file: BinaryIO, facts: LasFacts) -> Iterator[tuple[tuple[str
 def compressed_points(file: BinaryIO, facts: LasFacts) -> int:
     """Return the number of points in LASzip's chunks.
 
-    It is the header's number where older versions leave it open.
-
-    Raises Implausible for a table of chunks that does not fit the file: a decoder would make room
-    for what it says.
+    It is the header's number where older versions leave it open. Raises Implausible for a table of
+    chunks that does not fit the file: a decoder would make room for what it says.
     """
     laszip = facts.laszip
     if len(laszip) < 34:
@@ -351,9 +347,8 @@ def walk_pages(file: BinaryIO, facts: LasFacts, page: int, page_bytes: int) -> n
 def check_points(xyz: np.ndarray, facts: LasFacts) -> tuple[np.ndarray, np.ndarray]:
     """Return the lowest and highest coordinates, (3,) each, of points (n, 3).
 
-    They are the header's where there are no points.
-
-    Raises Implausible where points lie outside the header's bounds.
+    They are the header's where there are no points. Raises Implausible where points lie outside the
+    header's bounds.
     """
     lower, upper = compute_bounds(xyz) if len(xyz) else (facts.mins, facts.maxs)
     if not ((lower >= facts.mins - facts.rounding) & (upper <= facts.maxs + facts.rounding)).all():

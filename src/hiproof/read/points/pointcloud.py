@@ -90,10 +90,9 @@ Box = tuple[float, float, float, float]  # xmin, ymin, xmax, ymax in world metre
 class PointFileHeader:
     """The count, bounds and CRS that a point file states.
 
-    `bounds` are (xmin, ymin, zmin, xmax, ymax, zmax) in the file's own unit.
-
-    `steps` are those in which its coordinates come, in plan and in height, in its unit too: 0 where
-    they are fine or not known.
+    `bounds` are (xmin, ymin, zmin, xmax, ymax, zmax) in the file's own unit. `steps` are those in
+    which its coordinates come, in plan and in height, in its unit too: 0 where they are fine or not
+    known.
     """
 
     path: str
@@ -109,12 +108,11 @@ def read_points(
 ) -> PointCloud:
     """Read all points of the files, folders or wildcards `paths`.
 
-    They are in world metres. Those outside `box` in plan are left out.
-
-    Classes are kept, NaN and infinite coordinates dropped with an InputWarning. The CRS is
-    `settings.read.crs` where that is given, else the files' own; coordinates in feet are made
-    metres, and `units` of the cloud tells what they were. Raises InputError for what is missing,
-    unreadable, empty, in degrees, or in different CRSs.
+    They are in world metres. Those outside `box` in plan are left out. Classes are kept, NaN and
+    infinite coordinates dropped with an InputWarning. The CRS is `settings.read.crs` where that is
+    given, else the files' own; coordinates in feet are made metres, and `units` of the cloud tells
+    what they were. Raises InputError for what is missing, unreadable, empty, in degrees, or in
+    different CRSs.
     """
     files, read = expand_paths(paths), (settings or Settings()).read
     headers = {str(file): las_file_header(file) for file in files}
@@ -242,9 +240,7 @@ def las_file_header(path: str | Path) -> PointFileHeader | None:
 def find_steps(xyz: np.ndarray) -> tuple[float, float]:
     """Return the largest of STEPS in which coordinates (n, 3) come.
 
-    One is for plan, one for height.
-
-    It is 0 where coordinates are finer or too few.
+    One is for plan, one for height. It is 0 where coordinates are finer or too few.
 
     >>> find_steps(np.arange(600.0).reshape(-1, 3) * [0.5, 1.0, 0.01])
     (0.5, 0.0)
@@ -346,9 +342,8 @@ def drop_other_text(files: list[Path]) -> list[str | Path]:
 def file_kind(path: str | Path) -> str:
     """Return one of READERS, by the first bytes, else by the ending.
 
-    Raises InputError for anything else.
-
-    An address is not opened for it: it goes by its ending, and is LAS without one of the others'.
+    Raises InputError for anything else. An address is not opened for it: it goes by its ending, and
+    is LAS without one of the others'.
     """
     if is_url(path):
         suffix = Path(urlsplit(str(path)).path).suffix.lower()
@@ -391,11 +386,10 @@ def file_kind(path: str | Path) -> str:
 def common_crs(crs_of: dict[str, Any], arguments: Any = None, unit: str = "auto") -> Any:
     """Return the one CRS of point files, from what each names.
 
-    It is `arguments` where that is a CRS, else the files' own.
-
-    Files that name none go with those that do, and files overruled by `arguments` go with it, with
-    an InputWarning each. Raises InputError, naming both files, where two disagree, and for a CRS
-    that cannot be understood while neither `arguments` nor a `unit` stands in for it.
+    It is `arguments` where that is a CRS, else the files' own. Files that name none go with those
+    that do, and files overruled by `arguments` go with it, with an InputWarning each. Raises
+    InputError, naming both files, where two disagree, and for a CRS that cannot be understood while
+    neither `arguments` nor a `unit` stands in for it.
     """
     if arguments is None and unit == "auto":
         refuse_unknown(crs_of)

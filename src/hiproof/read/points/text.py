@@ -152,9 +152,7 @@ NAMES = {
 def find_columns(header: Sequence[str]) -> tuple[int, ...] | None:
     """Return the indices of x, y, z and classification among column names.
 
-    Classification is left out where there is none.
-
-    Returns None unless x, y and z are named.
+    Classification is left out where there is none. Returns None unless x, y and z are named.
 
     >>> find_columns(["Intensity", "X", "Y", "Z", "Classification"])
     (1, 2, 3, 4)

@@ -75,9 +75,8 @@ class TerrainChain:
 def read_terrain(path: str | Path, crs: Any = None, units: Units | None = None) -> RasterTerrain:
     """Open the terrain model at `path` for queries in world metres of `crs`.
 
-    Raises InputError.
-
-    `units` tell those of a cloud without a CRS. It takes rasterio, the extra `terrain`.
+    Raises InputError. `units` tell those of a cloud without a CRS. It takes rasterio, the extra
+    `terrain`.
     """
     import_rasterio()
     if "://" not in str(path) and not str(path).startswith("/vsi") and not Path(path).is_file():

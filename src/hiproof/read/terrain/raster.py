@@ -86,21 +86,16 @@ depend on what was read.
 class RasterTerrain:
     """A raster terrain model, interpolated bilinearly between its pixel centres.
 
-    It may be in another CRS than the cloud.
-
-    Pixels are read in tiles when asked for, a few of which are kept, so memory does not grow with
-    the raster. Pixels without a height take no part: beside pixels with heights these count alone,
-    amid others the answer is NaN.
+    It may be in another CRS than the cloud. Pixels are read in tiles when asked for, a few of which
+    are kept, so memory does not grow with the raster. Pixels without a height take no part: beside
+    pixels with heights these count alone, amid others the answer is NaN.
     """
 
     def __init__(self, path: str | Path, crs: Any = None, units: Units | None = None):
         """Open `path`, to be queried in world metres of `crs`.
 
-        None is for the raster's own CRS.
-
-        Raises InputError.
-
-        `units` are those of `crs`, which need naming where there is none.
+        None is for the raster's own CRS. Raises InputError. `units` are those of `crs`, which need
+        naming where there is none.
         """
         remember(str(path))
         self.path, self.source = str(path), f"terrain model {Path(mask(str(path))).name}"
@@ -156,10 +151,8 @@ class RasterTerrain:
     def height_unit(self) -> float:
         """Return the metres in one unit of the raster's heights.
 
-        The band names the unit, else its CRS, else it is the cloud's.
-
-        Heights over a plan in degrees are metres. Those over a plan in feet that name no unit are
-        taken for feet.
+        The band names the unit, else its CRS, else it is the cloud's. Heights over a plan in
+        degrees are metres. Those over a plan in feet that name no unit are taken for feet.
         """
         unit, own_crs = band_unit(self.dataset.units[self.band - 1], self.path), self.own_crs
         if unit is not None:
@@ -234,9 +227,8 @@ class RasterTerrain:
     def knows_any(self, xy_world: np.ndarray) -> bool:
         """Return whether there is a height at any of `xy_world` (n, 2).
 
-        Raises DamagedRaster where it cannot be read.
-
-        Of more than MOST_TILES_CHECKED tiles so many are read, evenly spread.
+        Raises DamagedRaster where it cannot be read. Of more than MOST_TILES_CHECKED tiles so many
+        are read, evenly spread.
         """
         row, column, inside = self.pixels_at(xy_world)
         places = np.column_stack([row, column])[inside]

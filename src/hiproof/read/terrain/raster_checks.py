@@ -69,9 +69,8 @@ def refuse_without_position(dataset: Any, path: str) -> None:
 def height_band(dataset: Any, path: str) -> int:
     """Return the number of the band of heights, the first that is opaque.
 
-    Raises InputError for pictures.
-
-    A raster of several such bands is used with a warning that names the one taken.
+    Raises InputError for pictures. A raster of several such bands is used with a warning that names
+    the one taken.
     """
     if not dataset.count:
         names = ", ".join(dataset.subdatasets[:3]) or "none"

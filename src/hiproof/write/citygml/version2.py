@@ -285,11 +285,9 @@ def undo_shift(sheet: Sheet) -> np.ndarray:
 def with_terrain(sheet: Sheet, shell: str, rings: list[str]) -> str:
     """Return the building's own LoD2 solid, surfaces and terrain line.
 
-    The solid is `shell`, the surfaces are of these `rings`, all as far as requested.
-
-    GDAL and QGIS show the last geometry of a building. Where surfaces are to be that, the line,
-    which is the same at all levels, stands before them as LoD1's; without LoD2 it would be the
-    last, and is left out.
+    The solid is `shell`, the surfaces are of these `rings`, all as far as requested. GDAL and QGIS
+    show the last geometry of a building. Where surfaces are to be that, the line, which is the same
+    at all levels, stands before them as LoD1's; without LoD2 it would be the last, and is left out.
     """
     lines, is_last = terrain_lines(sheet), not sheet.head.write.gml_surfaces
     has_lod2 = sheet.head.write.has_lod2

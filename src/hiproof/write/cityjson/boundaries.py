@@ -59,11 +59,9 @@ def building_geometry(
 ) -> list[dict[str, Any]]:
     """Return the geometry of the building itself, as far as `lods` ask.
 
-    The footprint comes always, then roof edge, blocks, and solid.
-
-    Vertices go to `vertices`. A building in parts has no solid of its own. `attributes` has further
-    ones of the solid's faces, by face. `finest` is the solid of LoD2.3, None where it is not asked
-    for.
+    The footprint comes always, then roof edge, blocks, and solid. Vertices go to `vertices`. A
+    building in parts has no solid of its own. `attributes` has further ones of the solid's faces,
+    by face. `finest` is the solid of LoD2.3, None where it is not asked for.
     """
     if figures is None:
         footprint = level_footprint(building)

@@ -52,12 +52,11 @@ def write_cityjson(
 ) -> None:
     """Write `buildings` (solids in world metres) to `path`.
 
-    It is CityJSONSeq 2.0, or one document if the name ends in `.json`.
-
-    `crs` is anything pyproj understands or None; coordinates are written in its unit. `prefix` goes
-    before roofer's attribute names; `scale` is the grid that coordinates are rounded to, in the
-    file's unit; `write` says what is drawn of a building. Raises OutputError when the file cannot
-    be written; an older file then stays.
+    It is CityJSONSeq 2.0, or one document if the name ends in `.json`. `crs` is anything pyproj
+    understands or None; coordinates are written in its unit. `prefix` goes before roofer's
+    attribute names; `scale` is the grid that coordinates are rounded to, in the file's unit;
+    `write` says what is drawn of a building. Raises OutputError when the file cannot be written; an
+    older file then stays.
     """
     head = FileHead(crs, write=write or WriteSettings(), prefix=prefix)
     CityJSONWriter(path, head, scale).add_all(buildings)

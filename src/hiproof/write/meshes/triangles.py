@@ -16,9 +16,8 @@ from ...model import ROOF, WALL, Face, Solid
 def face_triangles(vertices: np.ndarray, face: Face) -> np.ndarray:
     """Return vertex indices (t, 3) of triangles that tile `face`.
 
-    Holes are left out. Triangles are oriented like the outer ring.
-
-    `vertices` (n, 3) in any frame. No vertices are added, so that neighbouring faces stay joined.
+    Holes are left out. Triangles are oriented like the outer ring. `vertices` (n, 3) in any frame.
+    No vertices are added, so that neighbouring faces stay joined.
 
     >>> square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
     >>> face_triangles(square, Face(((0, 1, 2, 3),), "RoofSurface")).shape
@@ -41,9 +40,8 @@ def faces_triangles(
 ) -> list[np.ndarray]:
     """Return the triangles of every face, all cut by one call.
 
-    They are as from `face_triangles`.
-
-    `normals` are those of `face_normals`, where a caller has them.
+    They are as from `face_triangles`. `normals` are those of `face_normals`, where a caller has
+    them.
     """
     neighbours = [number for number, face in enumerate(faces) if not is_triangle(face)]
     normals = face_normals(vertices, faces) if normals is None else normals

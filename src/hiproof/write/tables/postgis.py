@@ -86,10 +86,8 @@ class Load:
     """The run that is loaded, and its tables.
 
     It has its `name`, the `folder` from which it came, the `prefix` of the tables, and the `srid`
-    of its coordinates.
-
-    Other runs in the tables are removed with `replace` and stay with `append`; without either they
-    are a reason to refuse.
+    of its coordinates. Other runs in the tables are removed with `replace` and stay with `append`;
+    without either they are a reason to refuse.
     """
 
     name: str
@@ -110,11 +108,9 @@ def load_tables(
     """Load `buildings` of a `run` into its tables, and return how many.
 
     They are PREFIX_buildings, PREFIX_parts and PREFIX_roofs of the database at `dsn`, coordinates
-    in `units`.
-
-    A building whose id comes again is told to `damaged` and left out. Raises InputError for a
-    prefix that makes no names of tables, OutputError for a database that cannot be written or holds
-    another run.
+    in `units`. A building whose id comes again is told to `damaged` and left out. Raises InputError
+    for a prefix that makes no names of tables, OutputError for a database that cannot be written or
+    holds another run.
     """
     if not TABLE_PREFIX.fullmatch(run.prefix):
         raise InputError(

@@ -20,9 +20,7 @@ LINE_RGBA = "50,50,50,255"
 class Style(NamedTuple):
     """A colour (#rrggbb) for each value of an expression over columns.
 
-    The last colour is that of all other values.
-
-    `alpha` lets surfaces below show.
+    The last colour is that of all other values. `alpha` lets surfaces below show.
     """
 
     layer: str

@@ -132,10 +132,8 @@ def tile_glb(
 ) -> bytes:
     """Return the file of the buildings `meshes`.
 
-    `rows` have their attributes by name.
-
-    Coordinates are about the tile's middle, which the node's translation gives in float64, so that
-    float32 is enough.
+    `rows` have their attributes by name. Coordinates are about the tile's middle, which the node's
+    translation gives in float64, so that float32 is enough.
     """
     document = GlbDocument()
     corners = np.concatenate([mesh.corners for mesh in meshes])

@@ -55,9 +55,8 @@ class Globe:
     def of(cls, crs: Any, geoid_height_m: float | None = None) -> Globe:
         """Return the globe as seen from `crs` (anything pyproj understands).
 
-        A `geoid_height_m` given is added to all heights.
-
-        Raises InputError where there is no CRS, or none of a place on the Earth.
+        A `geoid_height_m` given is added to all heights. Raises InputError where there is no CRS,
+        or none of a place on the Earth.
 
         >>> globe = Globe.of("EPSG:7415", geoid_height_m=43.2)
         >>> globe.geographic(np.array([[85000.0, 446000.0, 2.0]]))[0].round(3).tolist()

@@ -231,11 +231,10 @@ def quadtree(
 ) -> Tile:
     """Return the root of the tree of buildings.
 
-    They have `centres` (n, 2), `sizes` (n,) and numbers of `triangles` (n,), in metres.
-
-    A tile holds the largest buildings of its square, at least one and else at most `limit`
-    triangles, the rest goes to its four quarters; squares wider than `widest` hold none. Indices in
-    a tile are in the order given.
+    They have `centres` (n, 2), `sizes` (n,) and numbers of `triangles` (n,), in metres. A tile
+    holds the largest buildings of its square, at least one and else at most `limit` triangles, the
+    rest goes to its four quarters; squares wider than `widest` hold none. Indices in a tile are in
+    the order given.
 
     >>> tree = quadtree(np.array([[0.0, 0], [1, 1], [9, 9]]), np.array([3.0, 2, 1]), np.array([10,
     ...     10, 10]), limit=10)
