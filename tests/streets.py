@@ -41,13 +41,7 @@ def lose_house(id, x, y, front=6.0, depth=10.0):
     """Return the record of a building without a model."""
     record = place_house(id, x, y, front, depth)
     corners = [[WORLD[0] + u, WORLD[1] + v] for u, v in record["outline"][0]]
-    return {
-        "id": id,
-        "status": "no_points",
-        "outline": [corners],
-        "parts": [],
-        "attributes": {},
-    }
+    return {"id": id, "status": "no_points", "outline": [corners], "parts": [], "attributes": {}}
 
 
 def write_street(folder: Path, houses, **head) -> Path:

@@ -122,9 +122,7 @@ def test_the_command_line_keeps_its_errors_in_the_file(tmp_path, monkeypatch, ca
     (tmp_path / "a.laz").write_bytes(b"LASF")
     arguments = ["reconstruct", str(tmp_path / "a.laz"), "--out", str(tmp_path / "out")]
     monkeypatch.setattr(
-        sys,
-        "argv",
-        ["hiproof", *arguments, "--log-file", str(tmp_path / "run.log"), "--quiet"],
+        sys, "argv", ["hiproof", *arguments, "--log-file", str(tmp_path / "run.log"), "--quiet"]
     )
     with pytest.raises(SystemExit) as ended:
         main()

@@ -24,10 +24,7 @@ from pages import (
 from parametric_house import gable_house
 from sample_models import sample_points, write_sample_run
 
-pytestmark = [
-    needs_browser,
-    pytest.mark.filterwarnings("ignore::hiproof.errors.InputWarning"),
-]
+pytestmark = [needs_browser, pytest.mark.filterwarnings("ignore::hiproof.errors.InputWarning")]
 FILLED = 0.4  # of the canvas, the least that a scene fills one way: it is whole, but not lost
 
 READY = "async () => { do await new Promise(done => setTimeout(done, 50)); while (scene.loading); }"

@@ -192,11 +192,7 @@ def run_of_two(tmp_path):
     """Folder and buildings of a run as our writer leaves it: a gable, a courtyard, one without
     model.
     """
-    part = {
-        "type": "flat",
-        "parameters": {"width": 8, "length": 12},
-        "position": [0, 0, 5],
-    }
+    part = {"type": "flat", "parameters": {"width": 8, "length": 12}, "position": [0, 0, 5]}
     yard = {"origin": [85040, 446000, 0], "outline": [RING, YARD], "z_ground": 0}
     buildings = [
         replace(reconstruct_gable(), id="house"),

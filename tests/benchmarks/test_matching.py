@@ -84,10 +84,7 @@ def test_only_ends_under_another_part_are_hidden():
     )
     assert list_right_types(
         part("hip", length=9.0, width=6.0, height=3.0, ridge_length=3.0), True
-    ) == {
-        "hip",
-        "side_hip",
-    }
+    ) == {"hip", "side_hip"}
     assert list_right_types(wing, True) == {"gable"}
 
 

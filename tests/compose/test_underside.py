@@ -8,18 +8,7 @@ from hiproof.compose import check_solid, compose, terrain_intersection
 from hiproof.compose.underside import FOOT_TOLERANCE_M, make_underside
 from hiproof.errors import CompositionError
 from hiproof.frames import LocalFrame
-from hiproof.model import (
-    CEILING,
-    GROUND,
-    ROOF,
-    WALL,
-    Part,
-    Passage,
-    Piece,
-    Roof,
-    Solid,
-    Underside,
-)
+from hiproof.model import CEILING, GROUND, ROOF, WALL, Part, Passage, Piece, Roof, Solid, Underside
 from hiproof.settings import ComposeSettings, Settings
 from roof_zoo import KINDS, generate_roof
 

@@ -19,11 +19,7 @@ from hiproof.errors import HiproofError
 from hiproof.evaluate.overview import BuildingOutcome, Overview
 from hiproof.evaluate.report import embed_json, report_html, worst_indices
 from hiproof.evaluate.report_data import report_data
-from hiproof.evaluate.report_pictures import (
-    building_pictures,
-    histogram,
-    residual_bins,
-)
+from hiproof.evaluate.report_pictures import building_pictures, histogram, residual_bins
 from hiproof.evaluate.run import evaluate_run
 from hiproof.status import ATTENTION_OF_STATUS, Attention, Status, find_attention
 from hiproof.write.colours import CHANGE_COLOURS, RESIDUAL_STOPS, type_colour

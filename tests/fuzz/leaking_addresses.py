@@ -113,15 +113,7 @@ def list_ways(folder: Path) -> dict[str, Callable[[str], str]]:
     files.
     """
     run, cloud, log, out = folder / "run", str(folder / "cloud.xyz"), folder / "log", folder / "out"
-    functions = (
-        "reconstruct",
-        "--out",
-        str(out),
-        "--log-file",
-        str(log),
-        "--verbose",
-        "--restart",
-    )
+    functions = ("reconstruct", "--out", str(out), "--log-file", str(log), "--verbose", "--restart")
 
     def api(given_address: str) -> str:
         try:

@@ -21,9 +21,7 @@ UNITS = {"": 1.0, " m": 1.0, "m": 1.0, " metres": 1.0, " ft": 0.3048, "'": 0.304
 
 
 @given(
-    st.decimals(-2000, 2000, places=2),
-    st.sampled_from(sorted(UNITS)),
-    st.sampled_from([".", ","]),
+    st.decimals(-2000, 2000, places=2), st.sampled_from(sorted(UNITS)), st.sampled_from([".", ","])
 )
 def test_plain_numbers_are_read(value, unit, point):
     text = f"{value}".replace(".", point) + unit

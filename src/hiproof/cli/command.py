@@ -121,12 +121,7 @@ def make_command(name: str) -> Command:
     ]
     return Command(
         name,
-        params=[
-            *list_parameters(name, function),
-            *prints,
-            *settings,
-            *switches,
-        ],
+        params=[*list_parameters(name, function), *prints, *settings, *switches],
         callback=run_command,
         # each paragraph is one line, which the help wraps to the terminal
         help=re.sub(r"(?<!\n)\n(?!\n)", " ", inspect.getdoc(function) or ""),

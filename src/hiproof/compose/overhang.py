@@ -20,16 +20,7 @@ from ..model import CEILING, ROOF, WALL, Passage, Solid, Underside
 from .arrangement import COLLINEAR_UNITS, GRID_M
 from .building_parts import list_edges
 from .shell import simple_loops
-from .underside import (
-    Cap,
-    Corner,
-    GroundCell,
-    Place,
-    Shell,
-    cut_cells,
-    fit_plane,
-    list_rings,
-)
+from .underside import Cap, Corner, GroundCell, Place, Shell, cut_cells, fit_plane, list_rings
 
 SAME_PLACE_UNITS = 15.0  # 1.5 mm; composing a roof moves a corner of its outline by less
 LEAST_CLEARANCE_M = 0.1  # between a slab and the ground; eaves of a shed may hang that low
@@ -51,12 +42,7 @@ class OverhangingShell(Shell):
     on_edge_units = COLLINEAR_UNITS + 1.0  # walls of a composed solid bend by that without a corner
 
     def __init__(
-        self,
-        solid: Solid,
-        underside: Underside,
-        cap: Cap,
-        walls: shapely.Geometry,
-        thickness: int,
+        self, solid: Solid, underside: Underside, cap: Cap, walls: shapely.Geometry, thickness: int
     ) -> None:
         self.walls, self.thickness = walls, thickness
         self.slabs: dict[tuple[int, Place], int] = {}

@@ -49,11 +49,7 @@ class Desk:
     """
 
     def __init__(
-        self,
-        folder: Path,
-        who: str,
-        moved_to: Path | None = None,
-        only: Sequence[str] = (),
+        self, folder: Path, who: str, moved_to: Path | None = None, only: Sequence[str] = ()
     ) -> None:
         self.run, self.who = RunFolder(folder), plain_text(who)[:MOST_NOTE]
         self.only = frozenset(only)
@@ -118,10 +114,7 @@ class Desk:
             "parts": finite(record.get("parts")),
         }
         result["said"] = {name: (override or {}).get(name) for name in SAID}
-        result |= {
-            "outcome": detail,
-            "reasons": self.run.by_id[id].doubt.reasons,
-        }
+        result |= {"outcome": detail, "reasons": self.run.by_id[id].doubt.reasons}
         if not record.get("parts"):
             return result | {"error": detail or "no model"}
         try:

@@ -132,10 +132,7 @@ def find_known_box(terrain: RasterTerrain, boxes: np.ndarray) -> tuple[np.ndarra
             "none of them; check its place and its CRS"
         )
     step = sides[1] - sides[0]
-    return (
-        np.maximum(places.min(axis=0) - step, low),
-        np.minimum(places.max(axis=0) + step, high),
-    )
+    return (np.maximum(places.min(axis=0) - step, low), np.minimum(places.max(axis=0) + step, high))
 
 
 def find_horizon(places: np.ndarray, edges: np.ndarray) -> np.ndarray:

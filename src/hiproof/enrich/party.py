@@ -63,10 +63,7 @@ def box_table(walls: tuple[Wall, ...]) -> tuple[np.ndarray, np.ndarray]:
     s_low, z_low, s_high, z_high = shapely.bounds([wall.polygon for wall in walls]).T
     origin, along = np.array([wall.origin for wall in walls]), direction_table(walls)
     ends = np.stack([origin + s[:, None] * along for s in (s_low, s_high)])
-    return (
-        np.column_stack([ends.min(axis=0), z_low]),
-        np.column_stack([ends.max(axis=0), z_high]),
-    )
+    return (np.column_stack([ends.min(axis=0), z_low]), np.column_stack([ends.max(axis=0), z_high]))
 
 
 def touch(wall: Wall, other: Wall, touch_m: float) -> Contact | None:

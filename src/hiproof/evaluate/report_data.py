@@ -13,13 +13,7 @@ import shapely
 
 from ..status import Change, Status
 from ..write.attribute_list import OWN
-from ..write.colours import (
-    GRADE_COLOURS,
-    NO_MODEL,
-    STATUS_COLOURS,
-    SURVEY_COLOURS,
-    page_colours,
-)
+from ..write.colours import GRADE_COLOURS, NO_MODEL, STATUS_COLOURS, SURVEY_COLOURS, page_colours
 from ..write.meshes.triangles import pack_values, solid_mesh
 from .evaluation import TEXT_COLUMNS
 from .metrics import plan_outline, psd

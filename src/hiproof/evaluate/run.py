@@ -126,11 +126,7 @@ def evaluate_run(
     options: dict[str, Any] = {}
     if footprints is None:
         footprints, layer = inputs.footprint_file, layer or inputs.layer
-        options = {
-            "id_attribute": inputs.id_attribute,
-            "where": inputs.where,
-            "bbox": inputs.bbox,
-        }
+        options = {"id_attribute": inputs.id_attribute, "where": inputs.where, "bbox": inputs.bbox}
     models = tuple(
         read_models(
             run_models(folder), run_units(record), way_to_models(record), damaged, must_be_valid

@@ -95,9 +95,7 @@ class RoofN3D:
         rows = slice(self.starts[building], self.starts[building + 1])
         type = int(self.type_of[building])
         return Sample(
-            self.xyz[rows].astype(float),
-            np.where(self.on_surface[rows], type, NOT_ROOF),
-            type,
+            self.xyz[rows].astype(float), np.where(self.on_surface[rows], type, NOT_ROOF), type
         )
 
 

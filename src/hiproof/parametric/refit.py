@@ -56,9 +56,7 @@ class Unknowns:
 
 
 def refit(
-    building: Building,
-    points: np.ndarray,
-    fixed: Mapping[int, Collection[str]] | None = None,
+    building: Building, points: np.ndarray, fixed: Mapping[int, Collection[str]] | None = None
 ) -> Building:
     """Fit the parts of the building to `points` again; see `Building.refit`."""
     record, local = building_record(building), select_inside(building.roof, points)

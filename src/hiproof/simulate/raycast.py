@@ -56,11 +56,7 @@ def cast_convex(
 
 
 def cast_triangles(
-    xy0: np.ndarray,
-    slope: np.ndarray,
-    triangles: np.ndarray,
-    z_hit: np.ndarray,
-    face: np.ndarray,
+    xy0: np.ndarray, slope: np.ndarray, triangles: np.ndarray, z_hit: np.ndarray, face: np.ndarray
 ) -> None:
     """Raise `z_hit` where one of `triangles` (m, 3, 3) lies above it.
 

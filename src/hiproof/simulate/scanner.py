@@ -252,11 +252,7 @@ def with_outliers(rng: np.random.Generator, cloud: Scan, share: float) -> Scan:
     count = rng.poisson(share * len(cloud))
     position = cloud.points[rng.integers(len(cloud), size=count)] + rng.normal(
         0.0, 1.0, (count, 3)
-    ) * (
-        0.3,
-        0.3,
-        3.0,
-    )
+    ) * (0.3, 0.3, 3.0)
     points = np.concatenate([cloud.points, position])
     label = np.concatenate([cloud.label, np.full(count, NOT_ROOF, np.int8)])
     return Scan(

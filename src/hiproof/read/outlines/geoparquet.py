@@ -151,10 +151,7 @@ LONGITUDE_LATITUDE = "OGC:CRS84"
 BOX_COLUMNS = ("xmin", "ymin", "xmax", "ymax")
 """The sides of a box, as columns of boxes are named."""
 
-LISTS = {
-    "polygon": shapely.GeometryType.POLYGON,
-    "multipolygon": shapely.GeometryType.MULTIPOLYGON,
-}
+LISTS = {"polygon": shapely.GeometryType.POLYGON, "multipolygon": shapely.GeometryType.MULTIPOLYGON}
 """Encodings of surfaces that are lists of coordinates (GeoParquet 1.1, section "encoding")."""
 
 
@@ -257,10 +254,7 @@ def sides_of_rows(told: dict[str, Any], schema: Any) -> tuple[tuple[str, ...], .
 
 
 def read_rows(
-    file: Any,
-    column: GeometryColumn,
-    names: Sequence[str],
-    extent: shapely.Geometry | None = None,
+    file: Any, column: GeometryColumn, names: Sequence[str], extent: shapely.Geometry | None = None
 ) -> tuple[Any, np.ndarray]:
     """Read the columns `names` and the geometry of rows that meet `extent`.
 

@@ -132,10 +132,6 @@ def fragment(sheet: Sheet) -> Fragment:
     """Return a building's rows in the tables of a run, as text."""
     return Fragment(
         table_rows(
-            sheet.building,
-            sheet.figures,
-            sheet.attributes,
-            sheet.head.units.table,
-            sheet.surfaces,
+            sheet.building, sheet.figures, sheet.attributes, sheet.head.units.table, sheet.surfaces
         ).to_text()
     )

@@ -99,11 +99,7 @@ class Load:
 
 
 def load_tables(
-    dsn: str,
-    buildings: Iterable[Described],
-    units: FileUnits,
-    run: Load,
-    damaged: Damaged = refuse,
+    dsn: str, buildings: Iterable[Described], units: FileUnits, run: Load, damaged: Damaged = refuse
 ) -> int:
     """Load `buildings` of a `run` into its tables, and return how many.
 
@@ -152,11 +148,7 @@ class Loading:
         return f"{self.prefix}_{ending}"
 
     def load(
-        self,
-        stack: ExitStack,
-        buildings: Iterable[Described],
-        units: FileUnits,
-        damaged: Damaged,
+        self, stack: ExitStack, buildings: Iterable[Described], units: FileUnits, damaged: Damaged
     ) -> int:
         """Load the run; returns its number of buildings."""
         self.cursor.execute("select pg_advisory_xact_lock(%s, hashtext(%s))", (LOCKS, self.prefix))
@@ -311,10 +303,7 @@ class Loading:
 
 
 def collect_rows(
-    waiting: list[WaitingRows],
-    buildings: Iterable[Described],
-    units: FileUnits,
-    damaged: Damaged,
+    waiting: list[WaitingRows], buildings: Iterable[Described], units: FileUnits, damaged: Damaged
 ) -> int:
     """Put the rows of all buildings where they wait; returns how many buildings."""
     visited: set[str] = set()
@@ -349,13 +338,7 @@ def polyhedral_wkb(solid: Solid, units: Units) -> bytes:
 
 
 TRIANGLE_WKB = np.dtype(
-    [
-        ("order", "u1"),
-        ("type", "<u4"),
-        ("rings", "<u4"),
-        ("points", "<u4"),
-        ("xyz", "<f8", (4, 3)),
-    ]
+    [("order", "u1"), ("type", "<u4"), ("rings", "<u4"), ("points", "<u4"), ("xyz", "<f8", (4, 3))]
 )
 
 
