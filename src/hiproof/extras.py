@@ -1,7 +1,4 @@
-"""Optional packages: an extra of the install brings each.
-
-One sentence names it where it is missing.
-"""
+"""Optional packages: an extra of the install brings each, and one sentence names it."""
 
 from __future__ import annotations
 

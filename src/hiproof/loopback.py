@@ -1,7 +1,4 @@
-"""Pages for one person at this machine: a server at the loopback address.
-
-It decides who may ask, and what goes with every answer.
-"""
+"""Pages for one person at this machine: a server that decides who may ask, and headers."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""What is shown of work that goes on.
-
-These are bars on a terminal and in notebooks, and lines elsewhere.
-"""
+"""What is shown of work that goes on: bars on terminals and in notebooks, lines elsewhere."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""The points of buildings: smooth, large surfaces above the ground.
-
-`RoofSearch` finds the roofs of a whole cloud that has no class for them.
-"""
+"""The points of buildings: smooth, large surfaces above the ground, and a cloud's roofs."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""`hiproof classify`: the points of a LAS or LAZ file get classes.
-
-Everything else in the file stays as it is.
-"""
+"""`hiproof classify`: points of a LAS or LAZ file get classes, all else stays as it is."""
 
 from __future__ import annotations
 

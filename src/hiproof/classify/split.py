@@ -1,7 +1,4 @@
-"""Buildings of a cloud without footprints.
-
-Roof points are connected in plan, and touching houses are separated.
-"""
+"""Buildings of a cloud without footprints: connected roof points, touching houses apart."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""The smoothness and size of the surface on which each point lies.
-
-They tell roofs and walls from leaves.
-"""
+"""The smoothness and size of the surface of each point, which tell roofs and walls from leaves."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""The command line: one thin module a command.
-
-It is imported only when that command runs.
-"""
+"""The command line: one thin module a command, imported only when that command runs."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""The command `hiproof`.
-
-Its commands are imported when they are named, so that its help shows at once.
-"""
+"""The command `hiproof`: commands are imported when named, so that its help shows at once."""
 
 from __future__ import annotations
 

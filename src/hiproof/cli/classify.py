@@ -1,7 +1,4 @@
-"""`hiproof classify`: a copy of a LAS or LAZ file with classes.
-
-Ground and buildings get a class.
-"""
+"""`hiproof classify`: a copy of a LAS or LAZ file with classes of ground and buildings."""
 
 from __future__ import annotations
 

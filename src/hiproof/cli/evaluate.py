@@ -1,7 +1,4 @@
-"""`hiproof evaluate`: figures of a run's models.
-
-They are measured against points, footprints and a reference model.
-"""
+"""`hiproof evaluate`: figures of a run's models by points, footprints and a reference."""
 
 from __future__ import annotations
 

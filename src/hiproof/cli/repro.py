@@ -1,7 +1,4 @@
-"""`hiproof repro`: a building on which a run failed, run again.
-
-The run kept what this takes.
-"""
+"""`hiproof repro`: a building on which a run failed, run again from what the run kept."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""`hiproof segment`: label points with roof types.
-
-They are written with a table of types.
-"""
+"""`hiproof segment`: label points with roof types, and write a table of types."""
 
 from __future__ import annotations
 

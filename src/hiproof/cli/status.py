@@ -1,7 +1,4 @@
-"""`hiproof status`: the progress and summary of a run.
-
-They come from its ledger, while the run may still be writing it.
-"""
+"""`hiproof status`: progress and summary of a run by its ledger, also while it goes on."""
 
 from __future__ import annotations
 

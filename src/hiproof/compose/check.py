@@ -1,7 +1,4 @@
-"""Validity of solids by ISO 19107, with val3dity's codes.
-
-Each finding has a code and a sentence.
-"""
+"""Validity of solids by ISO 19107: findings with val3dity's codes and a sentence each."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""A model with overhangs: its roof over a larger outline, or its walls within it.
-
-`add_valid_eaves` keeps as many overhangs as make a valid solid.
-"""
+"""A model with overhangs: its roof over a larger outline, or its walls within it."""
 
 from __future__ import annotations
 

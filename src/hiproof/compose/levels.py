@@ -1,7 +1,4 @@
-"""Heights over the plan.
-
-They are the levels that meet at each plan vertex, and the places where faces of neighbours cross.
-"""
+"""Heights over the plan: levels that meet at each plan vertex, and where faces cross."""
 
 from __future__ import annotations
 

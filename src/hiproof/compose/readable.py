@@ -1,7 +1,4 @@
-"""Checks that a file of parameters can hold a roof.
-
-Its reader and its writer share them.
-"""
+"""Checks that a file of parameters can hold a roof, which its reader and writer share."""
 
 from __future__ import annotations
 

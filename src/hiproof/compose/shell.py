@@ -1,7 +1,4 @@
-"""From plan cells to a closed shell.
-
-It has roof faces over the cells, walls where levels part, and one ground face below.
-"""
+"""From plan cells to a closed shell: roof faces, walls where levels part, a ground face."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""A building in a notebook: a small view that turns, and a table of parts.
-
-No request leaves the page.
-"""
+"""A building in a notebook: a small view that turns, and a table of parts, all in the page."""
 
 from __future__ import annotations
 

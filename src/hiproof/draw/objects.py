@@ -1,7 +1,4 @@
-"""Buildings as objects of other packages.
-
-These are meshes of trimesh and pyvista, and tables of geopandas.
-"""
+"""Buildings as objects of other packages: meshes of trimesh and pyvista, geopandas' tables."""
 
 from __future__ import annotations
 

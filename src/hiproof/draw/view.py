@@ -1,7 +1,4 @@
-"""The view of a solid: faces turned, projected and ordered.
-
-They are ordered from far to near (painter's algorithm).
-"""
+"""The view of a solid: faces turned, projected and ordered from far to near."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""One edit of a building, as the page requests it.
-
-Parts go in, and a building comes out, by the functions of `parametric`.
-"""
+"""One edit of a building, as the page requests it, by the functions of `parametric`."""
 
 from __future__ import annotations
 

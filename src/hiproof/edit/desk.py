@@ -1,8 +1,4 @@
-"""The requests that the page may make.
-
-They are the list of buildings, one building, its points, an edit, and the two that write: accept,
-and take back.
-"""
+"""The requests that the page may make: buildings, points, edits, and accept or take back."""
 
 from __future__ import annotations
 

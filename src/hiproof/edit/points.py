@@ -1,7 +1,4 @@
-"""The roof points of one building, read as its run read them.
-
-They come from the run's clouds by its plan, a work tile at once.
-"""
+"""The roof points of one building, read from the run's clouds as its run read them."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""What the page shows of a building.
-
-It is its mesh, parts with their handles, numbers, and heights of points over the roof.
-"""
+"""What the page shows of a building: its mesh, parts with handles, numbers, points' heights."""
 
 from __future__ import annotations
 

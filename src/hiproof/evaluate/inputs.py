@@ -1,7 +1,4 @@
-"""The present place of the files from which a run was made.
-
-run.json keeps names as they were typed, and the folder in which they were.
-"""
+"""The present place of the files that run.json names as typed, with the folder they were in."""
 
 from __future__ import annotations
 

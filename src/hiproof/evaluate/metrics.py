@@ -1,7 +1,4 @@
-"""Measures of how well a model fits its points.
-
-They are point-surface distance (PSD), outline IoU and shares of points.
-"""
+"""Measures of how well a model fits its points: PSD, outline IoU and shares of points."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Finished models, read back from CityJSON.
-
-Evaluation, the report and the conversions start from them.
-"""
+"""Finished models, read back from CityJSON for evaluation, the report and conversions."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""How many buildings of a run were modelled, how well, and which need attention.
-
-The terminal, `hiproof status`, run.json and the report all show this overview.
-"""
+"""How many buildings of a run were modelled, how well, and which need attention."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""The data of the report's page.
-
-These are plain values and packed float32 arrays about a local origin.
-"""
+"""The data of the report's page: plain values and packed float32 about a local origin."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Which points belong to which footprint, by a grid of sorted points.
-
-Points are sorted once into grid cells, and then looked up building by building.
-"""
+"""Which points belong to which footprint, by a grid into which points are sorted once."""
 
 from __future__ import annotations
 

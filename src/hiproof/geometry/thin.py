@@ -1,7 +1,4 @@
-"""Thinning to one point a cell of the world's own grid.
-
-The result depends neither on the order of points nor on tiles.
-"""
+"""Thinning to one point a cell of the world's grid, whatever the order of points and tiles."""
 
 from __future__ import annotations
 

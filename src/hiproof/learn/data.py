@@ -1,7 +1,4 @@
-"""Sources of training clouds.
-
-They are the simulator, The Hague's real shapes under its scanner, and RoofN3D's real clouds.
-"""
+"""Sources of training clouds: the simulator, The Hague's real shapes under it, RoofN3D."""
 
 from __future__ import annotations
 

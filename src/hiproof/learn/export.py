@@ -1,7 +1,4 @@
-"""From a trained network to the ONNX file that `hiproof.segment` runs, its curve and its card.
-
-The curve of the training is a picture, and the model card is JSON and Markdown.
-"""
+"""From a trained network to the ONNX file of `hiproof.segment`, its curve, its model card."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Houses for training, closer to real ones than the tests' clean types.
-
-They have annexes, rows, sheds, cut corners and one-sided hips.
-"""
+"""Houses for training, closer to real ones: annexes, rows, sheds, cut corners, hips."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""The training data: one labelled cloud, and the roles of a source.
-
-Clouds are changed at random after PointNeXt's recipe.
-"""
+"""A labelled cloud, the roles of a source, and random changes after PointNeXt's recipe."""
 
 from __future__ import annotations
 

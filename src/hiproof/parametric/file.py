@@ -1,7 +1,4 @@
-"""parameters.jsonl, read line by line.
-
-It gives the head, the buildings, and errors by line and column.
-"""
+"""parameters.jsonl, read line by line: its head, buildings, and errors by line and column."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Finished models, building by building.
-
-They are those of a run's folder, of a parameters.jsonl, or of CityJSON and CityGML of any maker.
-"""
+"""Finished models, building by building, of runs, parameters.jsonl, CityJSON and CityGML."""
 
 from __future__ import annotations
 

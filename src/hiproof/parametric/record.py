@@ -1,7 +1,4 @@
-"""The JSON object of one building checked, and its parts made.
-
-Whatever is wrong becomes one sentence that says where.
-"""
+"""The JSON object of one building checked, in sentences that say where, and its parts made."""
 
 from __future__ import annotations
 

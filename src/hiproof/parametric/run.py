@@ -1,7 +1,4 @@
-"""`hiproof build`: a file of parameters becomes the files of a run.
-
-One building is in memory at a time.
-"""
+"""`hiproof build`: a file of parameters becomes the files of a run, building by building."""
 
 from __future__ import annotations
 

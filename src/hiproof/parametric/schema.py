@@ -1,7 +1,4 @@
-"""The JSON schema (draft 2020-12) of parameters.jsonl.
-
-Its first line is a `head`, every other a `building`.
-"""
+"""The JSON schema (draft 2020-12) of parameters.jsonl: a `head`, then lines of a `building`."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""All roof shapes by name.
-
-A new shape is a row of data/shapes.toml; every test covers it.
-"""
+"""All roof shapes by name, each a row of data/shapes.toml that every test covers."""
 
 from ..errors import SettingsError
 from . import cone, shed

@@ -1,7 +1,4 @@
-"""Files by address (http, https, s3, gs, ...), through fsspec.
-
-They are read in ranges as far as the server allows.
-"""
+"""Files by address (http, https, s3, gs, ...), in ranges where servers can, through fsspec."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Arrangement of a cloud.
-
-These parts of PointNet++ choose, describe and group points; they carry no weights.
-"""
+"""The parts of PointNet++ that choose, describe and group points, without any weights."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Figures of a classification.
-
-They are confusion matrix, accuracy, balanced accuracy, recalls, and mean intersection over union.
-"""
+"""Figures of a classification: confusion matrix, accuracies, recalls, mean IoU."""
 
 from __future__ import annotations
 

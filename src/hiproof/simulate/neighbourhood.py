@@ -1,7 +1,4 @@
-"""The demo: a small neighbourhood on a slope, with trees.
-
-It has every roof type and several compounds.
-"""
+"""The demo: a small neighbourhood on a slope, with trees, every roof type and compounds."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""An airborne laser scanner over simulated buildings and over solids.
-
-Points are labelled, and have the faults of real clouds.
-"""
+"""An airborne laser scanner over simulated buildings and solids, with real clouds' faults."""
 
 from __future__ import annotations
 

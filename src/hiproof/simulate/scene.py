@@ -1,7 +1,4 @@
-"""The targets of beams: buildings, solids, trees and clutter.
-
-They are half-spaces, triangles and crowns.
-"""
+"""The targets of beams: half-spaces, triangles and crowns of buildings, solids, trees."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""A survey flight over a town, and its files.
-
-They are a classified LAZ, a terrain model and footprints.
-"""
+"""A survey flight over a town, and its files: a classified LAZ, terrain and footprints."""
 
 from __future__ import annotations
 

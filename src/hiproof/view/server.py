@@ -1,7 +1,4 @@
-"""A page that shows 3D Tiles, served to this machine's browser alone.
-
-It needs no network.
-"""
+"""A page that shows 3D Tiles, served to this machine's browser alone, without network."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Every attribute and table that hiproof writes, by data/attributes.toml.
-
-The formats name them, and the documents list them.
-"""
+"""Every attribute and table of hiproof's formats and documents, by data/attributes.toml."""
 
 from __future__ import annotations
 

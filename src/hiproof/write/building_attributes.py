@@ -1,7 +1,4 @@
-"""The attributes of a building in every format.
-
-They have roofer's names, our own, and those of the input.
-"""
+"""The attributes of a building in every format: roofer's, our own, those of the input."""
 
 from __future__ import annotations
 

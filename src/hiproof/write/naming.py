@@ -1,7 +1,4 @@
-"""Names in files: gml:ids, CRSs, units and codes of installations.
-
-Ids are valid, unique and the same in every run.
-"""
+"""Names in files: ids valid, unique and the same in every run, CRSs, units and codes."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""The geometry of a building beside its own solid.
-
-It is footprint and roof edge, blocks, and building parts, as far as requested.
-"""
+"""The geometry of a building beside its own solid, as requested: LoD0, blocks, parts."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""The surfaces of a solid: a face each, or all facets of one curved surface.
-
-A surface has the number of its first face.
-"""
+"""The surfaces of a solid, numbered by first face: a face, or all facets of a curve."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""The life of an output file.
-
-It is opened, given one building after another, finished, and only then seen.
-"""
+"""The life of an output file: opened, given building after building, finished, then seen."""
 
 from __future__ import annotations
 

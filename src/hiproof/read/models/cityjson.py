@@ -1,7 +1,4 @@
-"""CityJSON and CityJSONSeq files, document by document.
-
-Vertices come in place. An InputError says why a file cannot be read.
-"""
+"""CityJSON and CityJSONSeq files, document by document, or an InputError that says why not."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Building footprints from files and databases.
-
-Every feature becomes one Footprint or more; none is lost.
-"""
+"""Building footprints from files and databases: one Footprint or more a feature, none lost."""
 
 from __future__ import annotations
 

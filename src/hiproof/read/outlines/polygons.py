@@ -1,7 +1,4 @@
-"""Plan polygons put right: flattened, split, repaired.
-
-Nothing vanishes: what has no area becomes an empty polygon.
-"""
+"""Plan polygons put right: flattened, split, repaired; what has no area becomes empty."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Features of a vector file through GDAL (pyogrio).
-
-GDAL reads GeoPackage, GeoJSON, Shapefile and others.
-"""
+"""Features of a vector file (GeoPackage, GeoJSON, Shapefile, ...) through GDAL (pyogrio)."""
 
 from __future__ import annotations
 

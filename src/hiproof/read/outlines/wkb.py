@@ -1,7 +1,4 @@
-"""Geometries from WKB.
-
-Surfaces in space, which GEOS does not know, become collections of polygons.
-"""
+"""Geometries from WKB; surfaces in space, unknown to GEOS, become polygons' collections."""
 
 from __future__ import annotations
 

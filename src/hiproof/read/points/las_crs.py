@@ -1,7 +1,4 @@
-"""The CRS that a LAS file's records define.
-
-It is WKT, or GeoTIFF keys where there is no WKT that can be understood.
-"""
+"""The CRS that a LAS file's records define: WKT, or GeoTIFF keys without any that is clear."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Points of PLY files, ascii and binary.
-
-A reader of its own: only the vertices' scalars are needed.
-"""
+"""Points of PLY files, ascii and binary: only the vertices' scalars are needed."""
 
 from __future__ import annotations
 

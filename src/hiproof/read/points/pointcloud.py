@@ -1,7 +1,4 @@
-"""Point clouds from LAS, LAZ, COPC, text and PLY files, in chunks.
-
-The kind of a file is found by its content and ending.
-"""
+"""Point clouds from LAS, LAZ, COPC, text and PLY files by content and ending, in chunks."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Points as text: XYZ, CSV, TXT, ASC and PTS, with or without a header.
-
-The delimiter is found from the first lines.
-"""
+"""Points as text (XYZ, CSV, TXT, ASC, PTS), their header and delimiter by the first lines."""
 
 from __future__ import annotations
 

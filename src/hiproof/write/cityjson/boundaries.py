@@ -1,7 +1,4 @@
-"""The geometry of one building in CityJSON.
-
-It is footprint and roof edge, blocks, and Solids with semantics.
-"""
+"""The geometry of a building in CityJSON: footprint, roof edge, blocks, Solids, semantics."""
 
 from __future__ import annotations
 

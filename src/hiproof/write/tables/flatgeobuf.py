@@ -1,7 +1,4 @@
-"""buildings.fgb: the outlines with all attributes as FlatGeobuf.
-
-Web maps read it by parts.
-"""
+"""buildings.fgb: outlines with all attributes as FlatGeobuf, which web maps read by parts."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""buildings, parts and roof_surfaces as GeoParquet 1.0 (needs pyarrow).
-
-They are for data frames and columnar databases.
-"""
+"""GeoParquet 1.0 of buildings, parts and surfaces for data frames (needs pyarrow)."""
 
 from __future__ import annotations
 

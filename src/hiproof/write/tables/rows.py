@@ -1,7 +1,4 @@
-"""The rows of one building in the tables of a run.
-
-They are its outline, its parts where they show, and its roof surfaces.
-"""
+"""The rows of one building in a run's tables: outline, parts where they show, surfaces."""
 
 from __future__ import annotations
 

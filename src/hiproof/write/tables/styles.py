@@ -1,7 +1,4 @@
-"""QGIS styles of the layers of a GeoPackage.
-
-They stand in the table `layer_styles`, whose defaults QGIS applies by itself.
-"""
+"""QGIS styles of a GeoPackage's layers, in the table `layer_styles` that QGIS applies."""
 
 from __future__ import annotations
 
