@@ -36,10 +36,7 @@ SLOPING = ("gable", "hip", "monopitch", "pyramid", "asymmetric_gable")
 def change_building(
     rng: np.random.Generator, building: SimBuilding, kind: str
 ) -> SimBuilding | None:
-    """Return the building after a change of `kind`, None where it allows none.
-
-    `kind` is a key of CHANGES, named as `hiproof update` names changes.
-    """
+    """Return the building after a change, a key of CHANGES, None where it allows none."""
     parts = CHANGES[kind](rng, building)
     if parts is None:
         return None
@@ -96,10 +93,7 @@ def lower_part(rng: np.random.Generator, building: SimBuilding) -> list[Part] | 
 def put_block(
     rng: np.random.Generator, part: Part, size: tuple[float, float], height: float
 ) -> Part | None:
-    """Return a level block of `size` on a part, None where it has no room.
-
-    Its top lies `height` (m) over the highest roof below.
-    """
+    """Return a level block on a part, `height` (m) over the highest roof below, or None."""
     p = part.parameters
     if (
         "width" not in p
@@ -156,10 +150,7 @@ def change_type(rng: np.random.Generator, building: SimBuilding) -> list[Part] |
 
 
 def change_slope(rng: np.random.Generator, building: SimBuilding) -> list[Part] | None:
-    """Make the roof of one part steeper or flatter.
-
-    Its ridge moves by 0.8 m or more.
-    """
+    """Make the roof of one part steeper or flatter: its ridge moves by 0.8 m or more."""
     part, parts = building.largest, building.roof.parts
     if len(parts) > 1 or part.type not in SLOPING or "height" not in part.parameters:
         return None

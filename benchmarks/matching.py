@@ -93,11 +93,7 @@ def has_hidden_end(part: Part, other_parts: Sequence[Part]) -> bool:
 
 
 def list_right_types(part: Part, hidden: bool) -> set[str]:
-    """Return the types that are right for a true part.
-
-    Of a hidden end nothing can be known, and an asymmetric gable of equal slopes is a gable whose
-    eaves differ.
-    """
+    """Return the right types of a true part: any for a hidden end, gables of equal slopes."""
     types = {part.type} | (
         {ONE_END_LESS[part.type]} if hidden and part.type in ONE_END_LESS else set()
     )

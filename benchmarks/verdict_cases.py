@@ -241,10 +241,7 @@ def find_seen_area(scene: Scene, density: float) -> shapely.Geometry:
 def iterate_cases(
     source: str, limit: int, density: float, with_footprints: bool, parity: str
 ) -> Iterator[Case]:
-    """Yield the cases of even or odd buildings of a source at one density.
-
-    Of four buildings one has no defect, one those of the scanner, two have others.
-    """
+    """Yield cases of even or odd buildings at one density, a quarter of them without defect."""
     other_defects = list(DEFECTS if with_footprints else OF_POINTS)
     for number, building, scanned in iterate_buildings(source, limit):
         if number % 2 != ("even", "odd").index(parity):

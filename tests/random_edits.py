@@ -112,10 +112,7 @@ def draw_edit(rng: np.random.Generator, house: Building) -> Callable[[], Buildin
 
 
 def count_outcomes(edits: int, buildings: int, seed: int) -> Counter:
-    """Edit buildings again and again; count the kinds of outcomes, each crash with its text.
-
-    An edit stands on those before it that made a building.
-    """
+    """Count the outcomes of edits upon edits of buildings, each crash with its text."""
     rng, houses, outcomes = np.random.default_rng(seed), generate_buildings(buildings), Counter()
     for number in range(edits):
         place = number % buildings

@@ -13,10 +13,7 @@ WORLD = (85000.0, 446000.0, 0.0)
 
 
 def place_house(id, x, y, front=6.0, depth=10.0, eave=6.0, rise=0.0, turn=0.0, **attributes):
-    """Return the record of a house whose south-west corner is (x, y), a gable where it has a rise.
-
-    The ridge runs along the front. The street is turned by `turn` (degrees) about its origin.
-    """
+    """Return a house from (x, y), a gable along the front for a rise, turned by degrees."""
     c, s = math.cos(math.radians(turn)), math.sin(math.radians(turn))
 
     def rotate(u, v):

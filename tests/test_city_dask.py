@@ -24,10 +24,7 @@ distributed = pytest.importorskip("distributed", reason="needs dask[distributed]
 
 @pytest.fixture(scope="module")
 def forked_workers():
-    """Let Dask fork workers from one process that has imported what they need.
-
-    Tests start a dozen.
-    """
+    """Let Dask fork a dozen workers from one process that has imported what they need."""
     with dask.config.set({"distributed.worker.multiprocessing-method": "forkserver"}):
         distributed.utils.get_mp_context().set_forkserver_preload([*WORK, "distributed"])
         yield

@@ -547,10 +547,7 @@ def test_constants_in_a_call_compile_nothing_apart(town):
 
 
 def test_the_pieces_compiled_beforehand_are_all_that_runs_call(tmp_path):
-    """A piece that lacks a function would leave it to be compiled by every worker.
-
-    With footprints, and without some for a few houses.
-    """
+    """A piece that lacks a function would leave it to be compiled by every worker."""
     script = f"""
 import sys
 from pathlib import Path

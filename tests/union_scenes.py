@@ -36,10 +36,7 @@ OUTLINES = (
 
 
 def draw_volume(rng, replacing=0.2):
-    """Draw a row (COLUMNS,) with a random rectangle, planes and tie.
-
-    Its ridge lies above its middle.
-    """
+    """Draw a row (COLUMNS,) with a rectangle, planes, a ridge above its middle, and a tie."""
     row = np.zeros(COLUMNS)
     row[DIRECTION] = rng.integers(2)
     u, v = np.sort(rng.uniform(-7.0, 7.0, (2, 2)), axis=1) + [[-0.5, 0.5]]
@@ -70,10 +67,7 @@ def draw_volumes(rng, most_volumes=5, replacing=0.2):
 
 
 def compute_heights(volumes, U, V):
-    """Return the height of the roof and the visible volume at U, V (directions, n).
-
-    It is the definition, in plain NumPy.
-    """
+    """Return heights of the roof and visible volumes at U, V (directions, n) by definition."""
     z, top = np.full(U.shape[1], -np.inf), np.zeros(U.shape[1], int)
     for k, row in enumerate(volumes):
         u, v = U[int(row[DIRECTION])], V[int(row[DIRECTION])]
@@ -97,10 +91,7 @@ def compute_heights(volumes, U, V):
 
 
 def draw_scene(rng, volumes=None, count=250, types=()):
-    """Draw a scene in two directions of points near the roof of `volumes`.
-
-    Without volumes, it is level ground. A tenth of the points is astray.
-    """
+    """Draw points near the roof of `volumes`, or level ground, a tenth of them astray."""
     outline = OUTLINES[rng.integers(len(OUTLINES))]
     x0, y0, x1, y1 = outline.bounds
     xy = rng.uniform((x0, y0), (x1, y1), (2 * count, 2))

@@ -55,10 +55,7 @@ def open_window(browser, served):
 
 
 def wait_until_true(page, expression):
-    """Wait until an expression of the page is true.
-
-    The page forbids eval, which playwright's own waiting needs.
-    """
+    """Wait until an expression of the page, which forbids eval, as playwright's is, is true."""
     end = time.monotonic() + WAIT_S
     while not page.evaluate(expression):
         assert time.monotonic() < end, f"still not so after {WAIT_S} s: {expression}"

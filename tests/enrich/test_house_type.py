@@ -20,10 +20,7 @@ RIGHT_SHARE = 0.97  # of house types on simulated streets
 
 
 def simulate_street(seed, blocks=24):
-    """Return houses along a street, turned somehow, with their types by id.
-
-    Beside some stands a garage, and every third row is set back and forth.
-    """
+    """Return houses along a street, types by id, with garages and rows set back and forth."""
     rng = np.random.default_rng(seed)
     turn, x = float(rng.uniform(0, 90)), 0.0
     houses, types = [], {}

@@ -174,10 +174,7 @@ def laz_lies(sound: dict) -> dict[str, tuple[str, bytes, str]]:
 
 
 def copc_lies(sound: dict) -> dict[str, tuple[str, bytes, str]]:
-    """COPC's hierarchy of pages and nodes.
-
-    The sound file has one page with one node, at its end.
-    """
+    """COPC's hierarchy of pages and nodes; the sound file ends with one page of one node."""
     ending, raw = sound["copc"]
     page = struct.unpack_from("<Q", raw, 375 + 54 + 40)[0]
     itself = pack(raw, "<Qii", page + 16, page, 32, -1)

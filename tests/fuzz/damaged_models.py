@@ -23,10 +23,7 @@ def sound_lines(folder: Path) -> list[dict]:
 def change(
     lines: list[dict], *path: str | int, to: object = None, by: Callable | None = None
 ) -> bytes:
-    """The file with the member at `path` (line, key, key, ...) replaced;
-
-    `...` stands for the line's only city object.
-    """
+    """The file with the member at `path` replaced; `...` is the line's only city object."""
     lines = copy.deepcopy(lines)
     place = lines
     for step in path[:-1]:

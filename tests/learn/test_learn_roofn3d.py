@@ -21,10 +21,7 @@ def multipoint(points):
 
 
 def write_roofn3d(folder, count=40, header_of_points="points"):
-    """Simulated clouds as RoofN3D; every roof is one surface.
-
-    Returns the number of roof points by id.
-    """
+    """Simulated clouds as RoofN3D, every roof one surface; returns roof points by id."""
     buildings = [
         [
             "id",

@@ -343,10 +343,7 @@ BOX = shapely.box(500000, 4649776, 500010, 4649786)
 
 
 def write_footprints(path, crs, units=1.0):
-    """One square in `units` of a metre;
-
-    `crs` as GDAL's text, or the number of a GeoPackage that has no CRS.
-    """
+    """One square in `units` of a metre; `crs` is GDAL's text, or a GeoPackage's number."""
     polygon = shapely.to_wkb([shapely.transform(BOX, lambda xy: xy / units)])
     pyogrio.raw.write(str(path), polygon.astype(object), [], [], geometry_type="Polygon", crs=crs)
     return path
