@@ -70,6 +70,10 @@ def sloped_ground(rng, n=20000, size=100.0):
     return np.column_stack([xy, 0.1 * xy[:, 0] - 0.05 * xy[:, 1] + rng.normal(0, 0.02, n)])
 
 
+def make_ground(ground_class, cells, box):
+    return ground_class(cells if ground_class is GroundAround else lambda: cells, box)
+
+
 @pytest.mark.parametrize("ground_class", [GroundAround, BareAround, LowestAround])
 def test_ground_of_a_building_ignores_what_lies_outside_its_box(ground_class):
     rng = np.random.default_rng(5)
@@ -77,9 +81,9 @@ def test_ground_of_a_building_ignores_what_lies_outside_its_box(ground_class):
     box = np.array([20.0, 20.0, 50.0, 50.0])
     inside = ((ground[:, :2] >= box[:2]) & (ground[:, :2] < box[2:])).all(axis=1)
     xy = rng.uniform(31, 40, (50, 2))
-    whole = ground_class(ground_cells(ground), box).height_at(xy)
+    whole = make_ground(ground_class, ground_cells(ground), box).height_at(xy)
     twice = rng.permutation(np.concatenate([ground[inside], ground[inside][:500]]))
-    assert np.array_equal(whole, ground_class(ground_cells(twice), box).height_at(xy))
+    assert np.array_equal(whole, make_ground(ground_class, ground_cells(twice), box).height_at(xy))
 
 
 @pytest.mark.parametrize("share", [1.0, 0.1, 0.01])
@@ -97,7 +101,7 @@ def test_ground_heights_equal_plain_weighted_planes(share):
         lower = np.sort(xyz[steps <= 9, 2])
         lowest = lower[1 if len(lower) >= 10 else 0] if len(lower) else np.nan
         assert np.array_equal(
-            LowestAround(cells, box).height_at(place[None]), [lowest], equal_nan=True
+            make_ground(LowestAround, cells, box).height_at(place[None]), [lowest], equal_nan=True
         )
         reach = next((reach for reach in (2, 5) if (steps <= reach).sum() >= 3), 9)
         nearby = xyz[steps <= reach]
@@ -149,7 +153,9 @@ def test_ground_without_points_is_unknown():
     box = np.array([0.0, 0.0, 10.0, 10.0])
     for ground_class in (GroundAround, BareAround, LowestAround):
         assert np.isnan(
-            ground_class(Cells(np.zeros((0, 3))), box).height_at(np.array([[5.0, 5.0]]))
+            make_ground(ground_class, Cells(np.zeros((0, 3))), box).height_at(
+                np.array([[5.0, 5.0]])
+            )
         ).all()
 
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from ..geometry.grid import number_cells
+from ..geometry.grid import count_cells, number_cells
 from ..model import Part, Roof
 from ..model.heights import find_highest
 
@@ -177,8 +177,8 @@ def choose_cell(inner: shapely.Geometry, *surveys: np.ndarray) -> float:
     points.
     """
     wide = CELL_SIDES_M[-1]
-    all_cells = [np.unique(np.floor(xyz[:, :2] / wide), axis=0) for xyz in surveys]
-    count = len(np.unique(np.concatenate(all_cells), axis=0))
+    all_cells = [number_cells(np.floor(xyz[:, :2] / wide))[0] for xyz in surveys]
+    count = count_cells(np.concatenate(all_cells))
     area = min(wide**2, inner.area / max(count, 1))  # that is inside, of a cell
     density = min(
         len(xyz) / max(len(cells) * area, 1e-9)

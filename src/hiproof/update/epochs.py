@@ -156,7 +156,7 @@ def find_ground(surroundings: Surroundings, job: Job) -> np.ndarray:
     box = neighbourhood(job, surroundings.plan.terrain_reach_m)
     points = surroundings.ground.inside(box)
     if not len(points):
-        points = BareAround(surroundings.low, box).bare.cells.inside(box)
+        points = BareAround(lambda: surroundings.low, box).bare.cells.inside(box)
     return points[~shapely.intersects_xy(job.area, points[:, 0], points[:, 1])]
 
 

@@ -14,6 +14,7 @@ count where the two contradict each other.
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -143,20 +144,20 @@ class ModelAround:
 class BareAround:
     """Terrain for one building where no class marks the ground.
 
-    It is the lowest cells, without what stands on it.
+    It is the lowest cells, without what stands on it. They are looked for when first asked for.
     """
 
-    cells: Cells
+    find_cells: Callable[[], Cells]
     box: np.ndarray
     source = "ground found by its shape"
 
     @functools.cached_property
     def bare(self) -> GroundAround:
-        """Found when first asked for, from the cells inside the box alone."""
+        """Found from the cells inside the box alone."""
         # with scipy.ndimage: not where the clouds have a ground class
         from ...classify.ground import bare_points
 
-        lowest = self.cells.inside(self.box)
+        lowest = self.find_cells().inside(self.box)
         return GroundAround(Cells(bare_points(lowest) if len(lowest) else lowest), self.box)
 
     def height_at(self, xy_world: np.ndarray) -> np.ndarray:
@@ -177,14 +178,15 @@ class LowestAround:
     ground.
     """
 
-    cells: Cells
+    find_cells: Callable[[], Cells]
     box: np.ndarray
     source, is_guess = "lowest points around the building", True
 
     def height_at(self, xy_world: np.ndarray) -> np.ndarray:
         """Return the height (n,) at `xy_world` (n, 2), NaN where no cell is known."""
         xy = np.asarray(xy_world, float)[:, :2]
-        heights = np.sort(self.cells.select_around(xy, RINGS[-1], self.box)[:, :, 2], axis=1)
+        around = self.find_cells().select_around(xy, RINGS[-1], self.box)
+        heights = np.sort(around[:, :, 2], axis=1)
         is_many = np.isfinite(heights[:, 9])
         return np.where(is_many, heights[:, 1], heights[:, 0])
 

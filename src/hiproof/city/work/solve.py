@@ -266,8 +266,9 @@ class Surroundings:
         They are those in the whole-metre box around it.
         """
         box = neighbourhood(job, self.plan.terrain_reach_m)
-        low, points = self.find_lowest(job, box), GroundAround(self.ground, box)
-        bare, lowest = BareAround(low, box), LowestAround(low, box)
+        find_low = functools.cache(lambda: self.find_lowest(job, box))  # most have better ground
+        points = GroundAround(self.ground, box)
+        bare, lowest = BareAround(find_low, box), LowestAround(find_low, box)
         if self.model is None:
             return [points, bare, lowest]
         model, own = WhereLikeGround(self.model, points), neighbourhood(job, 0.0)
