@@ -14,8 +14,12 @@ import shapely
 
 from hiproof.errors import InputError, InputWarning
 from hiproof.read.outlines.footprints import footprint_crs, read_footprints
-from hiproof.read.outlines.polygons import is_surface, simple_polygons
-from hiproof.read.outlines.wkb import as_polygons, decode_geometries
+from hiproof.read.outlines.polygons import (
+    as_polygons,
+    decode_geometries,
+    is_surface,
+    simple_polygons,
+)
 
 pytestmark = pytest.mark.filterwarnings("ignore::hiproof.errors.InputWarning")
 X, Y = 500000.0, 4649776.0

@@ -17,9 +17,17 @@ from ..errors import InputError
 from ..formats import FORMATS, TILE_FOLDER
 from ..frames import METRES, Units
 from ..model import GROUND, ROOF, Face, Solid
-from ..read.models.cityjson import UNUSABLE, Feature, features, unusable
+from ..read.models.cityjson import (
+    UNUSABLE,
+    Feature,
+    ShellSurface,
+    features,
+    read_geometries,
+    read_shell,
+    require_list,
+    unusable,
+)
 from ..read.models.damage import Damaged, excerpt, finite, refuse
-from ..read.models.shells import ShellSurface, read_geometries, read_shell, require_list
 from ..read.plausible import is_plausible
 from ..write.attribute_list import OWN
 from ..write.meshes.triangles import faces_triangles

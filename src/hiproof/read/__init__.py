@@ -13,8 +13,7 @@ outlines      building polygons; `read_footprints`
     footprints    footprints of any source
     attribute_columns  their attributes as they are declared; names in SQL
     vector_file   features of a vector file, by GDAL
-    wkb           its geometries, surfaces in space among them
-    polygons      polygons put right
+    polygons      polygons put right, from WKB with surfaces in space
     database      footprints from PostGIS
     geoparquet    GeoParquet files, of which only the row groups around an extent are fetched
     overture      footprints of an Overture Maps release
@@ -22,9 +21,8 @@ terrain       how high the ground is; `read_terrain`
     raster        terrain models
     raster_checks whether a raster can be one, and in which unit it counts
 models        models of other files
-    cityjson      documents of CityJSON with their vertices in place
+    cityjson      documents of CityJSON, vertices in place, and shells, every number checked
     damage        what becomes of a damaged building in a file of many
-    shells        shells of CityJSON, every number checked
     solids        solids of CityJSON and CityGML as they stand
 crs           reference systems and their units
     axes          what no roof can be built in is refused

@@ -22,9 +22,8 @@ from ...frames import METRES, Units
 from ...log import count_things
 from ...model import WALL, Face, Solid
 from ..crs import find_named_units, refuse_other_crs
-from .cityjson import UNUSABLE, features, unusable
+from .cityjson import UNUSABLE, features, read_geometries, read_shell, require_list, unusable
 from .damage import Damaged, refuse
-from .shells import read_geometries, read_shell, require_list
 
 GML_NAMESPACES = ("http://www.opengis.net/gml", "http://www.opengis.net/gml/3.2")
 XLINK_HREF = "{http://www.w3.org/1999/xlink}href"

@@ -23,7 +23,7 @@ import shapely
 from ...errors import InputError
 from ...extras import import_extra
 from ...masking import mask, remember
-from .wkb import as_polygons, decode_geometry
+from .polygons import as_polygons, decode_geometry
 
 TIMEOUT_S = 10  # to reach a server; libpq would wait for minutes
 SCHEMES = ("postgresql", "postgres")

@@ -29,7 +29,7 @@ from ...extras import import_extra
 from ..crs import read_named_crs
 from ..remote import is_url, open_binary
 from .attribute_columns import shortest
-from .wkb import decode_geometries
+from .polygons import decode_geometries
 
 ROW, FID = "hiproof_row", "hiproof_fid"
 """Columns of the table that answers a condition, of names that no file has."""

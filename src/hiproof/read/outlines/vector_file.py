@@ -17,7 +17,7 @@ from pyogrio.util import vsi_path
 
 from ...errors import InputError, InputWarning
 from .attribute_columns import make_known_condition, restore_declared_types
-from .wkb import decode_geometries
+from .polygons import decode_geometries
 
 SLASHED_DATE = re.compile(r"^(\d{1,5})/(\d\d)/(\d\d)")
 """How GDAL writes a date as text."""
