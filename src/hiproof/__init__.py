@@ -96,6 +96,7 @@ def _import_when_called(module: str, name: str) -> Callable[..., Any]:
     return call
 
 
+# Functions that methods of `model.Building` call, from packages that stand above `model`.
 METHODS = {
     name: _import_when_called(module, name)
     for name, module in {
@@ -107,7 +108,6 @@ METHODS = {
         "to_trimesh": "draw.objects",
     }.items()
 }
-"""Functions that methods of `model.Building` call, from packages that stand above `model`."""
 
 
 def __dir__() -> list[str]:

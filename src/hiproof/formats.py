@@ -45,11 +45,11 @@ FORMATS = {
         (resources.files("hiproof") / "data" / "formats.toml").read_text(encoding="utf-8")
     ).items()
 }
+# What `hiproof convert` writes: the parameters are what it reads.
 CONVERTED = {name: format for name, format in FORMATS.items() if name != "parameters"}
-"""What `hiproof convert` writes: the parameters are what it reads."""
 
+# What a work tile may have of its own.
 OF_TILES = {name: format for name, format in FORMATS.items() if format.tile_ending}
-"""What a work tile may have of its own."""
 
 TILE_FOLDER = "models"  # in a run's folder: the models of work tiles, where a run writes these
 

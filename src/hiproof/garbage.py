@@ -10,8 +10,8 @@ import gc
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+# New objects between two collections: some megabytes, and none while a command imports.
 RARELY = 200_000
-"""New objects between two collections: some megabytes, and none while a command imports."""
 
 
 @contextmanager

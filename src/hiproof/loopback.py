@@ -25,6 +25,7 @@ MOST_THREADS = 128  # of this process, each a connection: a browser opens six
 MOST_BYTES = 20_000_000  # bytes of a request: many times what any building's parts take
 HTML = "text/html; charset=utf-8"
 TEXT_TYPE = "text/plain; charset=utf-8"
+# Headers of every answer.
 SAFE = {
     "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src "
     "'self' "
@@ -34,7 +35,6 @@ SAFE = {
     "Cache-Control": "no-store",
     "Cross-Origin-Resource-Policy": "same-origin",
 }
-"""Headers of every answer."""
 
 Headers = Mapping[str, str] | Message
 

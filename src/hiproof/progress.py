@@ -15,8 +15,8 @@ from .compiled import news
 from .log import Level, console_level, count_things
 
 T = TypeVar("T")
+# Called with a stage, how much of it is done, and how much there is; None where nobody knows.
 Update = Callable[..., None]
-"""Called with a stage, how much of it is done, and how much there is; None where nobody knows."""
 
 FIRST_S = 0.3  # seconds until the first line: a command that ends sooner needs none
 LINE_S = 10.0  # seconds between two lines about one stage: enough to see that it goes on

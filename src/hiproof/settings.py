@@ -21,13 +21,13 @@ LARGEST_INTEGER = 10**15  # no number of a setting without bounds is larger
 SETTING_ROWS = tomllib.loads(
     (resources.files("hiproof") / "data" / "settings.toml").read_text(encoding="utf-8")
 )
+# What stands for the entries that a setting does not have in data/settings.toml.
 UNDECLARED = {
     **dict.fromkeys(("unit", "option", "names"), ""),
     **dict.fromkeys(("low", "high")),
     "choices": (),
     "fewest": 0,
 }
-"""What stands for the entries that a setting does not have in data/settings.toml."""
 
 
 class Section:
@@ -270,12 +270,12 @@ def check_value(name: str, declared: dataclasses.Field[Any], value: Any) -> Any:
     return tuple(check_item(name, SETTING_KINDS[declared.type], metadata, item) for item in values)
 
 
+# A value of an element's type, by the declared type of a setting of several values.
 SETTING_KINDS: dict[Any, object] = {
     "tuple[int, ...]": 0,
     "tuple[float, ...]": 0.0,
     "tuple[str, ...]": "",
 }
-"""A value of an element's type, by the declared type of a setting of several values."""
 
 
 def check_item(name: str, template: Any, declared: Any, value: Any) -> Any:

@@ -117,9 +117,9 @@ class ChangeKind(Enum):
         return self.name.lower()
 
 
+# Share of roof points within 0.2 m of the roof, below which a building does not count as modelled:
+# most of its points contradict the model.
 MOSTLY_OFF = 0.5
-"""Share of roof points within 0.2 m of the roof, below which a building does not count as modelled:
-most of its points contradict the model."""
 
 
 class Attention(Enum):

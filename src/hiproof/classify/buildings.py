@@ -58,8 +58,7 @@ def classify(
     return search.classes
 
 
-Square = tuple[int, int]
-"""Column and row of a square of WORK_M on the world's grid."""
+Square = tuple[int, int]  # column and row of a square of WORK_M on the world's grid
 
 
 class SquareSearch:

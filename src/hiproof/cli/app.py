@@ -17,8 +17,7 @@ from ..masking import mask
 from .command import Command, make_command, make_print_option, write_example, write_parameters
 from .parameters import COMMANDS
 
-LONGEST_COMPLAINT = 500
-"""Characters of a complaint about wrong usage: a few lines of a terminal."""
+LONGEST_COMPLAINT = 500  # characters of a complaint about wrong usage: a few lines of a terminal
 
 
 import_command = functools.cache(make_command)

@@ -133,6 +133,8 @@ def choose_type(kind: type, minimum: float | None, maximum: float | None, is_fol
     return kind
 
 
+# What the command line takes for a setting of a declared type: numbers one option each, texts
+# joined by commas.
 OPTION_TYPES: dict[Any, Any] = {
     "bool": bool,
     "int": int,
@@ -142,9 +144,6 @@ OPTION_TYPES: dict[Any, Any] = {
     "tuple[float, ...]": list[float],
     "tuple[str, ...]": str,
 }
-"""What the command line takes for a setting of a declared type: numbers one option each, texts
-joined by commas.
-"""
 
 
 def list_setting_options(sections: Iterable[str]) -> list[click.Parameter]:

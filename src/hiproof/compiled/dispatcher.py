@@ -76,8 +76,8 @@ class Callee(NamedTuple):
         getattr(import_module(self.module), self.name).load(self.args)
 
 
+# The large functions that are called by those being compiled, the innermost last.
 CALLS: list[dict[Callee, None]] = [{}]
-"""The large functions that are called by those being compiled, the innermost last."""
 
 
 class Compiler(compiler.Compiler):

@@ -23,10 +23,9 @@ from .check import check_solid
 
 Item = TypeVar("Item")
 
+# Of a part in plan; a smaller one (a chimney, a box on a roof) stays with the neighbour it borders
+# most.
 LEAST_PART_M2 = 4.0
-"""Of a part in plan; a smaller one (a chimney, a box on a roof) stays with the neighbour it borders
-most.
-"""
 
 
 @dataclass(frozen=True)
@@ -50,11 +49,9 @@ class Border(NamedTuple):
     end: int
 
 
-Place = tuple[int, int]
-"""A plan vertex, in tenths of a millimetre."""
+Place = tuple[int, int]  # a plan vertex, in tenths of a millimetre
 
-Borders = dict[tuple[Place, Place], Border]
-"""By directed plan edge."""
+Borders = dict[tuple[Place, Place], Border]  # by directed plan edge
 
 
 def building_parts(solid: Solid, planarity_m: float = 0.001) -> tuple[BuildingPart, ...]:

@@ -34,11 +34,9 @@ SNAP_UNITS = 1000.0  # 0.1 m; corners of passages so near a wall lie on it
 ON_EDGE_UNITS = 2.0  # 0.2 mm; rounding moves a corner off its edge by less
 ON_ROOF_UNITS = 10.0  # 1 mm; a corner lies under a roof face so near in plan
 
-Place = tuple[int, int]
-"""A place in plan, in units of the grid."""
+Place = tuple[int, int]  # a place in plan, in units of the grid
 
-Corner = tuple[int, int, int]
-"""A corner of a solid, in units of the grid."""
+Corner = tuple[int, int, int]  # a corner of a solid, in units of the grid
 
 
 class GroundCell(NamedTuple):
@@ -70,8 +68,8 @@ def make_underside(solid: Solid, underside: Underside, options: ComposeSettings)
     )
 
 
+# The greatest height (n,) of the ground at places (n, 2), in units of the grid.
 Cap = Callable[[np.ndarray], np.ndarray]
-"""The greatest height (n,) of the ground at places (n, 2), in units of the grid."""
 
 
 def cap_by_place(solid: Solid, clearance_m: float) -> Cap:

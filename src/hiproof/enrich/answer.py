@@ -36,6 +36,7 @@ SMALLEST_SHARED_WALL_M2 = 5.0
 # than a family house has. TABULA's apartment blocks have more than 12 dwellings.
 SMALLEST_APARTMENTS_M2, SMALLEST_BLOCK_M2 = 500.0, 1200.0
 APARTMENTS = "apartment_block"
+# TABULA's class of each type; an apartment block of SMALLEST_BLOCK_M2 or more is an AB.
 TABULA = {
     "detached": "SFH",
     "semi_detached": "SFH",
@@ -43,10 +44,9 @@ TABULA = {
     "mid_terrace": "TH",
     APARTMENTS: "MFH",
 }
-"""TABULA's class of each type; an apartment block of SMALLEST_BLOCK_M2 or more is an AB."""
 
+# Beginnings of words that name a residential use, in English, Dutch, German and French.
 RESIDENTIAL = ("resid", "dwell", "house", "apartment", "flat", "woon", "wohn", "habit", "logement")
-"""Beginnings of words that name a residential use, in English, Dutch, German and French."""
 
 
 def is_residential(use: Any) -> bool:
@@ -102,10 +102,9 @@ def is_house(building: Building) -> bool:
     return bool(area >= SMALLEST_HOUSE_M2 and z.max() - z.min() >= LOWEST_HOUSE_M)
 
 
+# Least and greatest height (m) of a storey, floor to floor: of dwellings from the least ceiling
+# that building codes allow to that of old town houses; of other uses up to that of shops and halls.
 RESIDENTIAL_STOREY_M, OTHER_STOREY_M = (2.5, 3.3), (3.0, 5.0)
-"""Least and greatest height (m) of a storey, floor to floor: of dwellings from the least ceiling
-that building codes allow to that of old town houses; of other uses up to that of shops and halls.
-"""
 HIGHEST_PLINTH_M = 0.6  # height (m) of a ground floor over the ground that houses seldom exceed
 HEADROOM_M = 1.5  # height (m) below the roof from which a floor counts as area
 

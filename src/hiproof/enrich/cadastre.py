@@ -129,16 +129,15 @@ def locate(head: FileHead, x: float, y: float) -> tuple[float, float, float]:
 
 SKY_CELL_M = 10_000.0  # side (m) of a square that has one sky: its sun differs by 0.1 degrees
 LEVEL_ROOF = 1e-3  # least share of a roof face that plan shows: steeper ones are walls
+# Settings that say something of the sun alone, and their options.
 FOR_SUN = {
     "weather": "--weather",
     "horizon": "--horizon",
     "shading_terrain": "--terrain",
     "sun_on_walls": "--sun-on-walls",
 }
-"""Settings that say something of the sun alone, and their options."""
 
-Surfaces = dict[int, dict[str, Any]]
-"""Attributes of faces by number."""
+Surfaces = dict[int, dict[str, Any]]  # attributes of faces by number
 
 
 class Cadastre:

@@ -26,11 +26,9 @@ MOST_MITRE = 10.0
 GRID_M = 0.0001  # grid (m) of cuts, on which solids are composed: no cut leaves a spike
 SAME_CORNER_M = 0.001  # a new corner (m) this close to another, or to an edge, lies on it
 SMALLEST_PIECE_M2 = 0.001  # area (m2) below which a piece of a wall is rounding
-Region = tuple[str, shapely.Geometry]
-"""A neighbour's id, and where a wall touches it."""
+Region = tuple[str, shapely.Geometry]  # a neighbour's id, and where a wall touches it
 
-Piece = tuple[str, Any]
-"""A neighbour's id, empty for an outer wall, and a polygon of the wall."""
+Piece = tuple[str, Any]  # a neighbour's id, empty for an outer wall, and a polygon of the wall
 
 
 def cut_walls(

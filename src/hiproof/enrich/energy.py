@@ -24,8 +24,8 @@ from .walls import measure_faces
 
 ENERGY_NAMESPACE = "http://www.sig3d.org/citygml/2.0/energy/1.0"
 BUILDING_TYPES = "https://episcope.eu/building-typology/"  # TABULA's classes
+# The type of the boundary that a face is; a wall is a sharedWall or an outerWall.
 BOUNDARY_TYPES = {ROOF: "roof", GROUND: "groundSlab"}
-"""The type of the boundary that a face is; a wall is a sharedWall or an outerWall."""
 
 
 def write_energy(sheet: Sheet) -> str:

@@ -45,11 +45,10 @@ from .party import Town
 from .records import Index, Records, index_records
 from .weather import name_sky
 
+# Modules of files that enriched folders do not have: parameters stay the run's.
 NOT_MADE = ("parameters",)
-"""Modules of files that enriched folders do not have: parameters stay the run's."""
 
-FAILURE = "failure"
-"""Where a building's fragments say why it has no answers, empty where it has."""
+FAILURE = "failure"  # where a building's fragments say why it has no answers, empty where it has
 
 
 class EnrichFailure(NamedTuple):
@@ -117,8 +116,8 @@ def leave(building: Building, reason: str, is_internal: bool) -> tuple[Answers, 
 
 
 BLOCK_BUILDINGS = 64  # buildings of a task: a second of work
+# The folder of a run that has its enriched files, and that of blocks until these are written.
 FOLDER, WAITING = "enriched", ".enrich"
-"""The folder of a run that has its enriched files, and that of blocks until these are written."""
 
 
 class Enriched(NamedTuple):

@@ -58,6 +58,7 @@ def make_wall(solid: Solid, number: int, normal: np.ndarray, origin: np.ndarray)
     return Wall(number, origin, along, polygon if polygon.is_valid else repair_polygons(polygon))
 
 
+# 3DBAG's name of each area that it has too.
 OF_3DBAG = {
     "ground_area_m2": "b3_opp_grond",
     "flat_roof_area_m2": "b3_opp_dak_plat",
@@ -65,7 +66,6 @@ OF_3DBAG = {
     "outer_wall_area_m2": "b3_opp_buitenmuur",
     "party_wall_area_m2": "b3_opp_scheidingsmuur",
 }
-"""3DBAG's name of each area that it has too."""
 
 
 def measure_areas(solid: Solid, party_m2: float) -> dict[str, float]:

@@ -19,10 +19,9 @@ from ..geometry.point_in_polygon import mark_inside
 from ..geometry.rings import ring_normal
 from ..model import as_xyz
 
+# (m, 3) vertices without the closing one; a polygon is a ring or a sequence of rings, the outer
+# first, holes after.
 Ring = np.ndarray
-"""(m, 3) vertices without the closing one; a polygon is a ring or a sequence of rings, the outer
-first, holes after.
-"""
 
 
 def point_surface_distances(

@@ -26,8 +26,7 @@ from ..write.values import round_value
 from .metrics import compute_share_within_20cm, iou, plan_outline, quality, well_inside
 from .models import BuildingModel
 
-TEXT_COLUMNS = ("id", "type", "status", "quality", "ref_id")
-"""Columns that are no figures."""
+TEXT_COLUMNS = ("id", "type", "status", "quality", "ref_id")  # columns that are no figures
 
 
 @dataclass(frozen=True)

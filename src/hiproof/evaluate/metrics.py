@@ -15,27 +15,22 @@ from ..geometry.rings import OVERLAY_GRID_M
 from ..model import ROOF, Fit, Quality, Solid
 from .distance import point_surface_distances, vertical_distances
 
+# A point within this vertical distance of the roof counts as explained well (the field's share
+# within 20 cm).
 NEAR_M = 0.2
-"""A point within this vertical distance of the roof counts as explained well (the field's share
-within 20 cm).
-"""
 
-FACADE_M = 0.3
-"""Points this close to the outline may be facade returns; the share leaves them out."""
+FACADE_M = 0.3  # points this close to the outline may be facade returns; the share leaves them out
 
-MIN_INNER_POINTS = 10
-"""A share of fewer points says nothing."""
+MIN_INNER_POINTS = 10  # a share of fewer points says nothing
 
+# A cell most of whose points lie farther than this above or below the roof holds something the
+# model lacks.
 UNEXPLAINED_M = 0.5
-"""A cell most of whose points lie farther than this above or below the roof holds something the
-model lacks.
-"""
 
-CELL_M = 1.0
-"""Side of the plan cells behind the no-data share and the unexplained area."""
+CELL_M = 1.0  # side of the plan cells behind the no-data share and the unexplained area
 
+# Polygons that together have all but their areas' sum share nothing, and none of them is lost.
 LOST_M2 = 1e-6
-"""Polygons that together have all but their areas' sum share nothing, and none of them is lost."""
 
 Polygons = Sequence[np.ndarray | Sequence[np.ndarray]]
 

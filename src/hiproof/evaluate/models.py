@@ -33,8 +33,8 @@ from ..write.attribute_list import OWN
 from ..write.meshes.triangles import faces_triangles
 
 RUN_MODELS = FORMATS["cityjsonseq"].file
+# What hiproof tells of a roof surface: its part's number and type.
 PART_ATTRIBUTE, PART_TYPE = f"{OWN}part", f"{OWN}part_type"
-"""What hiproof tells of a roof surface: its part's number and type."""
 
 SUN_ATTRIBUTE = f"{OWN}sun_kwh_m2"  # of a surface that `hiproof enrich --sun` describes
 # Of a building, so that their numbers fit the columns and tables of all formats.

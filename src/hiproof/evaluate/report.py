@@ -30,8 +30,8 @@ from .report_pictures import building_pictures, histogram
 from .run import EvaluatedRun
 
 WORST = 20  # buildings shown with pictures: as many as are read to the end
+# Buildings on the map and in the 3D view, about 10 kB each: beyond this, browsers grow slow.
 MOST_SHOWN = 10_000
-"""Buildings on the map and in the 3D view, about 10 kB each: beyond this, browsers grow slow."""
 
 DISTRIBUTIONS = (
     ("psd_mean", "mean distance of a building's points, facades included", "m"),
@@ -50,6 +50,7 @@ TABLE_FIGURES = {
     "outline_iou": "outline IoU",
 }
 
+# What a mapper does next, by class of change, or kind of a roof outside all outlines.
 NEXT_STEPS = {
     "uncertain": (
         "building",
@@ -83,7 +84,6 @@ NEXT_STEPS = {
         "not covered by the new survey, or not in all parts. Their models are the earlier ones.",
     ),
 }
-"""What a mapper does next, by class of change, or kind of a roof outside all outlines."""
 
 
 def write_report(

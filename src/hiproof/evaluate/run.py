@@ -32,6 +32,7 @@ from .metrics import plan_outline
 from .models import BuildingModel, read_models, run_models
 
 NUMBER = (int, float)
+# What of run.json is used, and what it must be where it is there.
 RECORD: dict[tuple[str, ...], Any] = {
     ("settings",): dict,
     ("settings", "read"): dict,
@@ -63,7 +64,6 @@ RECORD: dict[tuple[str, ...], Any] = {
     ("summary", "needs_attention"): dict,
     **{("summary", "needs_attention", kind.code): NUMBER for kind in Attention},
 }
-"""What of run.json is used, and what it must be where it is there."""
 
 
 @dataclass(frozen=True)

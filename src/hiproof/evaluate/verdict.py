@@ -34,45 +34,43 @@ from .distance import point_surface_distances
 from .layers import unseen_share
 from .metrics import FACADE_M, NEAR_M, well_inside
 
+# Share of the roof points within NEAR_M of the roof, below which a model is fair, and poor. Roofs
+# of old towns that look right have 0.75 to 0.9: gutters, parapets, chimneys.
 LEAST_NEAR, POOR_NEAR = 0.75, 0.6
-"""Share of the roof points within NEAR_M of the roof, below which a model is fair, and poor. Roofs
-of old towns that look right have 0.75 to 0.9: gutters, parapets, chimneys."""
 
+# Share and area of the outline without roof points, above either of which a model is fair, and the
+# share above which it is poor.
 MOST_UNSEEN, MOST_UNSEEN_M2, POOR_UNSEEN = 0.1, 15.0, 0.4
-"""Share and area of the outline without roof points, above either of which a model is fair, and the
-share above which it is poor."""
 
+# Height off the roof and area of a place that a person sees: a dormer for two windows.
 LEVEL_M, LEVEL_M2 = 0.5, 3.0
-"""Height off the roof and area of a place that a person sees: a dormer for two windows."""
 
+# Share of the points in a plan cell above which it lies off the roof: along steps fewer do.
 MOSTLY_OFF_SHARE = 0.5
-"""Share of the points in a plan cell above which it lies off the roof: along steps fewer do."""
 
+# Rise (m) of the points' distances across a part, the share of their variance that is a slope, and
+# area of such parts, from which the roof slopes another way. Terraces for a slope have these.
 TILT_M, TILTED_SHARE, TILT_M2 = 0.2, 0.5, 20.0
-"""Rise (m) of the points' distances across a part, the share of their variance that is a slope, and
-area of such parts, from which the roof slopes another way. Terraces for a slope have these."""
 
-FEWEST_TILTED = 20
-"""Points of a part from which a slope in their distances is told."""
+FEWEST_TILTED = 20  # points of a part from which a slope in their distances is told
 
+# Height (m) above the roof from which a cluster counts whatever its area; chimneys are lower.
 TALL_M = 3.0
-"""Height (m) above the roof from which a cluster counts whatever its area; chimneys are lower."""
 
+# Points of a cluster: birds, and echoes that come late, are fewer in one place.
 FEWEST_IN_CLUSTER = 5
-"""Points of a cluster: birds, and echoes that come late, are fewer in one place."""
 
+# Side of the plan cells of a cluster, which touch: distances between points, were they even, and
+# metres at least.
 LINK_SPACINGS, LINK_M = 1.5, 1.0
-"""Side of the plan cells of a cluster, which touch: distances between points, were they even, and
-metres at least."""
 
-POOR_CLUSTER = 0.2
-"""Share of the outline that a cluster covers, above which a model is poor."""
+POOR_CLUSTER = 0.2  # share of the outline that a cluster covers, above which a model is poor
 
+# Roof points near a part that shows more than so many m2; with fewer its height is a guess.
 FEWEST_ON_PART, SMALL_PART_M2 = 3, 1.0
-"""Roof points near a part that shows more than so many m2; with fewer its height is a guess."""
 
+# Share of the outline under parts on fewer points, above which a model is poor.
 POOR_UNSUPPORTED = 0.3
-"""Share of the outline under parts on fewer points, above which a model is poor."""
 
 
 class Cluster(NamedTuple):
@@ -132,8 +130,7 @@ def judge_evidence(evidence: Evidence) -> Verdict:
     return Verdict(Grade.POOR if is_poor else Grade.FAIR, tuple(reason for _, reason in findings))
 
 
-Finding = tuple[bool, str]
-"""Whether it makes a model poor, and the finding in words."""
+Finding = tuple[bool, str]  # whether it makes a model poor, and the finding in words
 
 
 def share_findings(evidence: Evidence) -> list[Finding]:

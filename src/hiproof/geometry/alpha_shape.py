@@ -14,10 +14,9 @@ import shapely
 
 from ..errors import FitError
 
+# Default radius in point spacings: below 2 the shapes of sparse uniform points fall apart, above 3
+# bays fill up.
 SPACINGS = 2.5
-"""Default radius in point spacings: below 2 the shapes of sparse uniform points fall apart, above 3
-bays fill up.
-"""
 
 
 def default_radius(xy: np.ndarray) -> float:

@@ -32,10 +32,9 @@ class Source(Protocol):
 
 
 FEWEST_KEPT = 30  # points that dropping leaves of a cloud; fewer show no roof
+# Columns of the features that change sign when a building is mirrored along or across its own first
+# axis.
 ALONG_AXES, ACROSS_AXES = (0, 3, 8), (1, 4, 9)
-"""Columns of the features that change sign when a building is mirrored along or across its own
-first axis.
-"""
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 from .solid import Solid
 
-WALLS, ROOF_EDGE = "walls", "roof"
-"""What an outline is that of."""
+WALLS, ROOF_EDGE = "walls", "roof"  # what an outline is that of
 
 
 @dataclass(frozen=True)

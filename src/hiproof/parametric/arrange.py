@@ -23,11 +23,11 @@ from ..primitives.cants import keep_cants_in_place
 from .change import make_polygon, with_sizes
 from .record import list_at, number, numbers_by_name, place, polygon
 
+# Parameters that grow with a side of the rectangle.
 INNER = {
     "length": ("ridge_length", "top_length"),
     "width": ("top_width", "break_width", "ridge_offset"),
 }
-"""Parameters that grow with a side of the rectangle."""
 
 GRID_M = 1e-4  # m; the grid on which solids are composed
 FAR_M = 1e4  # m; beyond any building, for a half plane drawn as a rectangle

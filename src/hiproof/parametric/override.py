@@ -61,18 +61,17 @@ KEYS = (
     *NOTE_KEYS,
 )
 
+# Difference (m) between a ground given and the terrain from which on it is remarked: a code for
+# "unknown", or another height system. Ground levels of registers differ less from the lowest
+# terrain along the walls.
 FAR_GIVEN_GROUND_M = 5.0
-"""Difference (m) between a ground given and the terrain from which on it is remarked: a code for
-"unknown", or another height system. Ground levels of registers differ less from the lowest terrain
-along the walls.
-"""
 
+# Least and largest possible value of keys that are numbers. Codes such as -9999 lie beyond.
 RANGES = {
     **dict.fromkeys(("z_ground", "ridge_height", "eave_height"), (LOWEST_LAND_M, HIGHEST_LAND_M)),
     "block_height": (0.1, HIGHEST_BUILDING_M),
     "parts": (1.0, float(MOST_PARTS)),
 }
-"""Least and largest possible value of keys that are numbers. Codes such as -9999 lie beyond."""
 
 
 @dataclass(frozen=True)

@@ -24,8 +24,8 @@ import numpy as np
 MOST_CANTS = 8  # of a member: with its four sides it has twelve
 MEASURES = ("facing", "distance", "eave", "pitch")
 CANTS = tuple(f"cant{number}" for number in range(1, MOST_CANTS + 1))
+# Every parameter of a cant.
 CANTED = frozenset(f"{what}_{cant}" for cant in CANTS for what in MEASURES)
-"""Every parameter of a cant."""
 
 
 def no_cants() -> np.ndarray:

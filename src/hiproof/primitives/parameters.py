@@ -13,10 +13,8 @@ from .catalogue import CATALOGUE
 from .contract import LEVEL, SIDES
 from .family import COMPONENTS, list_eaves
 
+# Parameters of a member's sides and cants; a part that has one gives all of its shape side by side.
 SIDED = CANTED | {f"{what}_{side}" for side in SIDES for what in ("pitch", "eave", "skew")}
-"""Parameters of a member's sides and cants; a part that has one gives all of its shape side by
-side.
-"""
 
 # degrees; steeper is a wall, and its height at an edge is beyond any file's digits
 STEEPEST_DEG = 89.0

@@ -16,11 +16,11 @@ from typing import Any, NamedTuple
 
 from ..errors import InputWarning
 
+# Metres of the units of length that may follow a number.
 METRES_OF = {
     **dict.fromkeys(("", "m", "metre", "metres", "meter", "meters"), 1.0),
     **dict.fromkeys(("ft", "foot", "feet", "'"), 0.3048),
 }
-"""Metres of the units of length that may follow a number."""
 
 PLAIN_NUMBER = re.compile(
     r"([+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:e[+-]?\d+)?)\s*([a-z']*)", re.IGNORECASE

@@ -10,21 +10,17 @@ from typing import Any
 
 import numpy as np
 
+# Largest x or y, in the input's unit: the widest systems in use (Gauss-Kruger zones in feet) stay
+# below 2e8.
 MOST_PLAN = 1e9
-"""Largest x or y, in the input's unit: the widest systems in use (Gauss-Kruger zones in feet) stay
-below 2e8.
-"""
 
-MOST_HEIGHT = 1e6
-"""Largest height, in the input's unit: Everest has 29,032 feet."""
+MOST_HEIGHT = 1e6  # largest height, in the input's unit: Everest has 29,032 feet
 
+# Heights of land on Earth (m): the Dead Sea's shore lies at -430 and ellipsoidal heights up to 107
+# lower. Codes for "no data" such as -9999, 9999 and -32767 lie beyond, also in decimetres and feet.
 LOWEST_LAND_M, HIGHEST_LAND_M = -600.0, 9000.0
-"""Heights of land on Earth (m): the Dead Sea's shore lies at -430 and ellipsoidal heights up to 107
-lower. Codes for "no data" such as -9999, 9999 and -32767 lie beyond, also in decimetres and feet.
-"""
 
-HIGHEST_BUILDING_M = 1000.0
-"""Highest building (m above its ground): the Burj Khalifa has 828."""
+HIGHEST_BUILDING_M = 1000.0  # highest building (m above its ground): the Burj Khalifa has 828
 
 
 class Implausible(ValueError):

@@ -21,8 +21,8 @@ import shapely
 from ..errors import InputError, InputWarning
 from ..log import count_things
 
+# Our catalogue's name of each RoofN3D class.
 ROOFN3D_TYPES = {"saddleback roof": "gable", "two-sided hip roof": "hip", "pyramid roof": "pyramid"}
-"""Our catalogue's name of each RoofN3D class."""
 
 FIELD_LIMIT = 1 << 30  # bytes of a field; csv's own limit is below a large roof's points
 UNASSIGNED = -1  # label of a point on no surface

@@ -14,13 +14,12 @@ from ..model import Part, Piece, Roof
 from ..primitives import CATALOGUE, get
 
 NOT_ROOF = -1  # label of what is no roof, as in segment
+# The types of whole roofs: what a building made up at random has where none is named, and what the
+# network tells apart.
 ROOF_TYPES = (
     *("flat", "monopitch", "gable", "hip", "half_hip"),
     *("pyramid", "mansard", "shed", "asymmetric_gable", "gambrel"),
 )
-"""The types of whole roofs: what a building made up at random has where none is named, and what the
-network tells apart.
-"""
 
 
 def find_label(type: str | None) -> int:

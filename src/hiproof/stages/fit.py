@@ -17,8 +17,7 @@ from ..status import Status
 from .points import FEWEST_POINTS
 from .recognise import Recognised, fits_one
 
-LIKELY = 0.05
-"""A roof type less probable to the network is not fitted by the paper's objective."""
+LIKELY = 0.05  # a roof type less probable to the network is not fitted by the paper's objective
 
 
 @dataclass(frozen=True)

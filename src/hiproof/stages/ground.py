@@ -18,13 +18,11 @@ if TYPE_CHECKING:
     from ..fit.site import Site
     from ..read.terrain import Terrain
 
-ASSUMED_WALL_M = 3.0
-"""Height of the lowest wall where nothing is known of the terrain."""
+ASSUMED_WALL_M = 3.0  # height of the lowest wall where nothing is known of the terrain
 
+# Of the lowest point below all of the roof, from which on walls are seen; a gutter or a bay hangs
+# less far down.
 WALLS_SEEN_M = 1.5
-"""Of the lowest point below all of the roof, from which on walls are seen; a gutter or a bay hangs
-less far down.
-"""
 
 
 @dataclass(frozen=True)

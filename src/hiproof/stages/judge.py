@@ -18,10 +18,9 @@ from .remarks import add_remark
 if TYPE_CHECKING:
     from ..evaluate.metrics import Inner
 
+# Of ground above the lowest eave; less is how well both are known, where a roof comes down to the
+# ground.
 SUNK_M = 0.2
-"""Of ground above the lowest eave; less is how well both are known, where a roof comes down to the
-ground.
-"""
 
 
 def judge(

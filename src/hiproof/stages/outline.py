@@ -11,15 +11,13 @@ import shapely
 from ..frames import LocalFrame
 from ..geometry.rings import repair_polygons
 
+# Of an outline that roofs are fitted over; the time grows with the square of them, and a building
+# has no more corners.
 MOST_OUTLINE_VERTICES = 500
-"""Of an outline that roofs are fitted over; the time grows with the square of them, and a building
-has no more corners.
-"""
 
+# Of an outline of thousands that are simplified at once: teeth take Douglas and Peucker the square
+# of them.
 PIECE_VERTICES = 64
-"""Of an outline of thousands that are simplified at once: teeth take Douglas and Peucker the square
-of them.
-"""
 
 
 def largest_polygon(geometry: shapely.Geometry) -> shapely.Polygon:

@@ -12,11 +12,9 @@ from ..read.plausible import is_plausible
 from ..status import Status
 from .outline import largest_polygon
 
-FEWEST_POINTS = 4
-"""A roof plane and one point to doubt it; below that a building is a flat block."""
+FEWEST_POINTS = 4  # a roof plane and one point to doubt it; below that a building is a flat block
 
-LINE_WIDTH_M = 0.05
-"""Width (m) of a strip of points that is too narrow for a roof."""
+LINE_WIDTH_M = 0.05  # width (m) of a strip of points that is too narrow for a roof
 
 
 def usable(

@@ -41,6 +41,7 @@ DECLARED = tomllib.loads(
     (resources.files("hiproof") / "data" / "attributes.toml").read_text(encoding="utf-8")
 )
 SIZES, KINDS_OF_TYPES = DECLARED["sizes"], DECLARED["kinds"]
+# Every parameter of a part by name, but for those of cants: unit and meaning.
 SHAPE: dict[str, tuple[str, str]] = {
     **SIZES,
     **{
@@ -55,12 +56,9 @@ SHAPE: dict[str, tuple[str, str]] = {
         for name, of_side in DECLARED["of_sides"].items()
     },
 }
-"""Every parameter of a part by name, but for those of cants: unit and meaning."""
 
+# Beginnings of the names of parameters in degrees; all others but a number of teeth are in metres.
 ANGLES = tuple(f"{what}_" for what in ("pitch", "skew", "facing"))
-"""Beginnings of the names of parameters in degrees; all others but a number of teeth
-are in metres.
-"""
 
 
 def describe_type(type: str) -> str:
@@ -114,8 +112,8 @@ TABLES: dict[str, AttributeTable] = {}
 for name, row in DECLARED["tables"].items():
     TABLES[name] = read_table(row, TABLES)
 TABLES["parts"] = add_shape(TABLES["parts"])
+# Attributes that building parts have of their own.
 OF_PARTS: list[str] = DECLARED["tables"]["building_part"]["include"]["roofer"]
-"""Attributes that building parts have of their own."""
 PREFIX, OWN = TABLES["roofer"].prefix, TABLES["hiproof"].prefix
 
 PREFACE = """# Attributes

@@ -14,6 +14,7 @@ from ..primitives.catalogue import CATALOGUE, describe_type
 from ..status import Change
 
 OTHER = "other"
+# Colour of each entry of a legend of roof types; "other" holds free shapes and unknown types.
 ROOF_COLOURS = {
     "flat": "#7a8069",
     "monopitch": "#dfba20",
@@ -24,7 +25,6 @@ ROOF_COLOURS = {
     "pyramid": "#f47ccb",
     OTHER: "#7a4372",
 }
-"""Colour of each entry of a legend of roof types; "other" holds free shapes and unknown types."""
 
 WALL_COLOUR = "#e8e2d6"
 GROUND_COLOUR = "#8c8c84"
@@ -50,6 +50,7 @@ STATUS_COLOURS = {
     "internal_error": "#1d1d1d",
     NO_MODEL: UNKNOWN_COLOUR,
 }
+# Colour from each distance in metres upwards, blue near and red far.
 RESIDUAL_STOPS = (
     (0.0, "#2c7bb6"),
     (0.05, "#9bd0e8"),
@@ -57,9 +58,10 @@ RESIDUAL_STOPS = (
     (0.2, "#f58a3c"),
     (0.4, "#a01428"),
 )
-"""Colour from each distance in metres upwards, blue near and red far."""
 
 
+# Colour from each irradiation in a year (kWh/m2) upwards: north roofs and shade are blue, and the
+# best roofs of northern and of southern Europe are orange and red.
 SUN_STOPS = (
     (0.0, "#2c7bb6"),
     (500.0, "#9bd0e8"),
@@ -67,9 +69,6 @@ SUN_STOPS = (
     (1100.0, "#f58a3c"),
     (1500.0, "#a01428"),
 )
-"""Colour from each irradiation in a year (kWh/m2) upwards: north roofs and shade are blue, and the
-best roofs of northern and of southern Europe are orange and red.
-"""
 
 
 def list_legend(kind: str | None) -> str:

@@ -239,11 +239,11 @@ def sync(path: Path) -> None:
 
 RUN_RECORD = "run.json"  # what every run keeps beside its models
 PARAMETERS = FORMATS["parameters"].file
+# Files of a run's folder that no other command makes again.
 OWN_FILES = frozenset(
     [format.file for format in FORMATS.values() if format.fragment]
     + [RUN_RECORD, "changes.csv", "changes.gpkg", "edits.jsonl"]
 )
-"""Files of a run's folder that no other command makes again."""
 
 
 def refuse_overwriting(outputs: Iterable[Path], inputs: Iterable[Any]) -> None:

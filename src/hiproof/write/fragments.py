@@ -79,8 +79,7 @@ class Fragment:
     extent: tuple[float, ...] | None = None
 
 
-Fragments = dict[str, Fragment]
-"""One building's texts by the module that made them."""
+Fragments = dict[str, Fragment]  # one building's texts by the module that made them
 
 
 def save_fragments(file: BinaryIO, parts: Sequence[Fragments]) -> None:

@@ -143,7 +143,7 @@ class FileUnits:
 
 
 FUNCTIONS = {CHIMNEY: "1030", ROOF_OBJECT: "1070"}
+# Codes of SIG3D: chimney, and others.
 FUNCTION_SPACE = (
     "http://www.sig3d.org/codelists/standard/building/2.0/BuildingInstallation_function.xml"
 )
-"""Codes of SIG3D: chimney, and others."""

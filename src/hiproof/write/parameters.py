@@ -244,6 +244,7 @@ def numbers(values: Iterable[float], digits: int = LENGTH_DIGITS) -> list[float 
     return [number(value, digits) for value in values]
 
 
+# How values of a type are written; all others are as they are.
 WRITERS: dict[str, Callable[[Any], Any]] = {
     **dict.fromkeys(("number", "number?", "length"), number),
     **dict.fromkeys(
@@ -254,4 +255,3 @@ WRITERS: dict[str, Callable[[Any], Any]] = {
     "polygon[]": lambda outlines: [outline_record(outline) for outline in outlines],
     "place[][]": lambda lines: [places(line) for line in lines],
 }
-"""How values of a type are written; all others are as they are."""

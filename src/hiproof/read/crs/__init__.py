@@ -15,18 +15,18 @@ from ...errors import InputError, InputWarning
 from ...frames import METRES, Units
 from .axes import check_height_axis, check_plan_axes
 
-WGS84 = CRS.from_epsg(4326)
-"""What places on the Earth are compared in."""
+WGS84 = CRS.from_epsg(4326)  # what places on the Earth are compared in
 
+# Units by the setting's name, for coordinates without a CRS.
 NAMED_UNITS = {
     "auto": METRES,
     "metre": METRES,
     "foot": Units(0.3048, 0.3048, "foot", "foot"),
     "us-survey-foot": Units(1200 / 3937, 1200 / 3937, "US survey foot", "US survey foot"),
 }
-"""Units by the setting's name, for coordinates without a CRS."""
 
 
+# EPSG codes of names in `urn:adv:crs:PLAN*HEIGHT`, as German surveying authorities write them.
 ADV_NAMES = {
     **{f"ETRS89_UTM{zone}": 25800 + zone for zone in (31, 32, 33)},
     **{f"DE_DHDN_3GK{zone}": 31464 + zone for zone in (2, 3, 4, 5)},
@@ -35,7 +35,6 @@ ADV_NAMES = {
     "DE_DHHN92_NH": 5783,
     "DE_DHHN2016_NH": 7837,
 }
-"""EPSG codes of names in `urn:adv:crs:PLAN*HEIGHT`, as German surveying authorities write them."""
 
 
 @dataclass(frozen=True)

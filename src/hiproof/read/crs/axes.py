@@ -11,14 +11,14 @@ from typing import Any
 
 from ...errors import InputError
 
+# Shortest and longest unit (m) of a coordinate: EPSG's own linear units run from 0.001 m to 1,852
+# m.
 LEAST_UNIT_M, MOST_UNIT_M = 1e-3, 2000.0
-"""Shortest and longest unit (m) of a coordinate: EPSG's own linear units run from 0.001 m to 1,852
-m.
-"""
 
+# Starts of the names of units that count angles. WKT 1 declares units without their kind.
 ANGULAR_UNITS = ("degree", "radian", "grad", "gon", "arc-second", "arc-minute")
-"""Starts of the names of units that count angles. WKT 1 declares units without their kind."""
 
+# Directions of axes clockwise from north, a sixteenth of a turn apart.
 COMPASS = (
     *(
         "north",
@@ -40,7 +40,6 @@ COMPASS = (
     ),
     *("northWest", "northNorthWest"),
 )
-"""Directions of axes clockwise from north, a sixteenth of a turn apart."""
 
 
 def check_plan_axes(plan: Any, source: str) -> None:

@@ -23,10 +23,9 @@ from pyproj.transformer import AreaOfInterest, TransformerGroup
 from ...errors import InputWarning
 from . import describe_crs, parse_crs
 
+# Accuracy (m) from which on an operation is worth a remark: footprints a metre off take their
+# neighbours' roofs.
 COARSE_OPERATION_M = 1.0
-"""Accuracy (m) from which on an operation is worth a remark: footprints a metre off take their
-neighbours' roofs.
-"""
 
 
 @dataclass(frozen=True)

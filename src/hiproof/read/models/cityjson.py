@@ -24,6 +24,7 @@ from .damage import Damaged, excerpt, readable, refuse
 
 Rings = tuple[tuple[int, ...], ...]
 
+# What CityJSON's surfaces of a building's shell are, of the three that a model of ours has.
 KINDS = {
     **{kind: kind for kind in (ROOF, WALL, GROUND)},
     "OuterFloorSurface": ROOF,
@@ -32,7 +33,6 @@ KINDS = {
     "Window": WALL,
     "Door": WALL,
 }
-"""What CityJSON's surfaces of a building's shell are, of the three that a model of ours has."""
 
 
 class ShellSurface(NamedTuple):
@@ -112,8 +112,8 @@ def read_vertices(vertices: Any) -> np.ndarray:
     return result.reshape(-1, 3)
 
 
+# What comes of taking a document apart that is JSON, but not what CityJSON says it is.
 UNUSABLE = (KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError)
-"""What comes of taking a document apart that is JSON, but not what CityJSON says it is."""
 
 ESCAPED = re.compile(
     r"\\u(?:[dD][89a-fA-F]|0000)"

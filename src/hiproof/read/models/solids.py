@@ -29,8 +29,8 @@ GML_NAMESPACES = ("http://www.opengis.net/gml", "http://www.opengis.net/gml/3.2"
 XLINK_HREF = "{http://www.w3.org/1999/xlink}href"
 CITYGML_SUFFIXES = (".gml", ".xml", ".citygml")
 BUILDING_OBJECT = "BuildingInstallation"
+# City objects whose shells come out by themselves.
 OWNERS = ("Building", "BuildingPart", BUILDING_OBJECT)
-"""City objects whose shells come out by themselves."""
 
 SURFACES = {
     "RoofSurface",

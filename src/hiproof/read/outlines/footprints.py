@@ -38,8 +38,8 @@ from .polygons import is_surface, simple_polygons
 if TYPE_CHECKING:
     from .vector_file import Features
 
+# What GDAL calls the CRSs -1, 0 and 99999 of a GeoPackage, which has to name one.
 UNDEFINED_CRS = ("Undefined Cartesian SRS", "Undefined geographic SRS", "Undefined SRS")
-"""What GDAL calls the CRSs -1, 0 and 99999 of a GeoPackage, which has to name one."""
 
 SAME_M = 0.01  # m, within which two outlines are the same: footprints are drawn in centimetres
 

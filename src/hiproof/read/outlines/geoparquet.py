@@ -31,8 +31,8 @@ from ..remote import is_url, open_binary
 from .attribute_columns import shortest
 from .polygons import decode_geometries
 
+# Columns of the table that answers a condition, of names that no file has.
 ROW, FID = "hiproof_row", "hiproof_fid"
-"""Columns of the table that answers a condition, of names that no file has."""
 
 
 def parquet_crs(path: str | Path) -> CRS | None:
@@ -139,20 +139,17 @@ def plain_column(column: Any) -> Any:
     return pyarrow.array(convert_values(column).tolist(), from_pandas=True)
 
 
-MAGIC = b"PAR1"
-"""The first bytes of every Parquet file."""
+MAGIC = b"PAR1"  # the first bytes of every Parquet file
 
-SUFFIXES = (".parquet", ".geoparquet")
-"""By which a file is known whose bytes are not at hand."""
+SUFFIXES = (".parquet", ".geoparquet")  # by which a file is known whose bytes are not at hand
 
+# The CRS of a file that names none (GeoParquet 1.1, section "crs").
 LONGITUDE_LATITUDE = "OGC:CRS84"
-"""The CRS of a file that names none (GeoParquet 1.1, section "crs")."""
 
-BOX_COLUMNS = ("xmin", "ymin", "xmax", "ymax")
-"""The sides of a box, as columns of boxes are named."""
+BOX_COLUMNS = ("xmin", "ymin", "xmax", "ymax")  # the sides of a box, as columns of boxes are named
 
+# Encodings of surfaces that are lists of coordinates (GeoParquet 1.1, section "encoding").
 LISTS = {"polygon": shapely.GeometryType.POLYGON, "multipolygon": shapely.GeometryType.MULTIPOLYGON}
-"""Encodings of surfaces that are lists of coordinates (GeoParquet 1.1, section "encoding")."""
 
 
 @dataclass(frozen=True)

@@ -115,15 +115,14 @@ def find_asset(item: Document, suffix: str) -> str:
     return min(ways, key=lambda way: not way.startswith(("http://", "https://")))
 
 
-KEYWORD = "overture"
-"""What stands for the release in place of a file of footprints."""
+KEYWORD = "overture"  # what stands for the release in place of a file of footprints
 
 THEME = "buildings"
+# The theme of buildings and its types; the parts of a building lie inside its own outline.
 TYPES = ("building", "building_part")
-"""The theme of buildings and its types; the parts of a building lie inside its own outline."""
 
+# What of a building goes with its outline; `building_id` is that of a part's building.
 ATTRIBUTES = ("height", "min_height", "num_floors", "roof_shape", "building_id")
-"""What of a building goes with its outline; `building_id` is that of a part's building."""
 
 ATTRIBUTION = "© OpenStreetMap contributors, Overture Maps Foundation"
 

@@ -138,17 +138,16 @@ def meetings(polygon: shapely.Polygon) -> int:
     return count
 
 
+# Kinds of geometry in the plan by their number in WKB (OGC 06-103r4, table 7).
 POINT, LINE_TYPE, POLYGON_TYPE, MULTI_POLYGON, COLLECTION = 1, 2, 3, 6, 7
-"""Kinds of geometry in the plan by their number in WKB (OGC 06-103r4, table 7)."""
 
-POLYHEDRAL_SURFACE, TIN, TRIANGLE = 15, 16, 17
-"""Kinds of surface in space by their number there."""
+POLYHEDRAL_SURFACE, TIN, TRIANGLE = 15, 16, 17  # kinds of surface in space by their number there
 
+# Surfaces that are laid out in bytes as polygons are, and differ by their number alone.
 AS_POLYGONS = {POLYHEDRAL_SURFACE: MULTI_POLYGON, TIN: MULTI_POLYGON, TRIANGLE: POLYGON_TYPE}
-"""Surfaces that are laid out in bytes as polygons are, and differ by their number alone."""
 
+# Bits of the number in PostGIS's WKB; ISO adds 1000 for z, 2000 for m, 3000 for both.
 Z_FLAG, M_FLAG, SRID_FLAG = 1 << 31, 1 << 30, 1 << 29
-"""Bits of the number in PostGIS's WKB; ISO adds 1000 for z, 2000 for m, 3000 for both."""
 
 
 def decode_geometries(wkb: np.ndarray) -> np.ndarray:

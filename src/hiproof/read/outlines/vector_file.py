@@ -19,13 +19,11 @@ from ...errors import InputError, InputWarning
 from .attribute_columns import make_known_condition, restore_declared_types
 from .polygons import decode_geometries
 
-SLASHED_DATE = re.compile(r"^(\d{1,5})/(\d\d)/(\d\d)")
-"""How GDAL writes a date as text."""
+SLASHED_DATE = re.compile(r"^(\d{1,5})/(\d\d)/(\d\d)")  # how GDAL writes a date as text
 
+# What pyogrio raises for a value that it cannot represent; text that is no UTF-8 is a ValueError,
+# too.
 READ_ERRORS = (ValueError, OverflowError, FieldError)
-"""What pyogrio raises for a value that it cannot represent; text that is no UTF-8 is a ValueError,
-too.
-"""
 
 
 def read_layer(
@@ -149,8 +147,8 @@ def virtual_layer(path: str, layer: str, geometry: str = "", text: str = "") -> 
     return ElementTree.tostring(root, encoding="unicode")
 
 
+# Metadata (fields and crs), feature numbers, geometries and columns of a layer.
 Features = tuple[dict[str, Any], np.ndarray, np.ndarray, list[np.ndarray]]
-"""Metadata (fields and crs), feature numbers, geometries and columns of a layer."""
 
 
 def read_vector_file(

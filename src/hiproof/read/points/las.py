@@ -88,13 +88,13 @@ def check_nodes(xyz: np.ndarray, nodes: np.ndarray, facts: LasFacts, octree: Oct
         )
 
 
+# What is decompressed of points of formats 6 to 10; older formats come whole.
 SELECTION = (
     DecompressionSelection.XY_RETURNS_CHANNEL
     | DecompressionSelection.Z
     | DecompressionSelection.CLASSIFICATION
     | DecompressionSelection.FLAGS
 )
-"""What is decompressed of points of formats 6 to 10; older formats come whole."""
 
 
 class Decoded(NamedTuple):

@@ -12,37 +12,30 @@ from pyproj.exceptions import CRSError
 
 from ..crs import UnknownCRS, combine, explain_crs_error, names_heights_alone, vertical_crs
 
+# Records that hold the keys: the directory, and where it points to for decimals and for texts.
 DIRECTORY, DOUBLES, TEXTS = 34735, 34736, 34737
-"""Records that hold the keys: the directory, and where it points to for decimals and for texts."""
 
-MODEL, CITATION = 1024, 1026
-"""Keys of the kind of CRS and of its name."""
+MODEL, CITATION = 1024, 1026  # keys of the kind of CRS and of its name
 
-GEODETIC_CRS = 2048
-"""Key of the code of a CRS in degrees, or of the base of a projected one."""
+GEODETIC_CRS = 2048  # key of the code of a CRS in degrees, or of the base of a projected one
 
+# Keys of the code of a projected CRS, of its name, of its unit and of the length of a unit without
+# a code.
 PROJECTED_CRS, PROJECTED_CITATION, PLAN_UNIT, PLAN_UNIT_SIZE = 3072, 3073, 3076, 3077
-"""Keys of the code of a projected CRS, of its name, of its unit and of the length of a unit without
-a code.
-"""
 
-VERTICAL_CRS, VERTICAL_UNIT = 4096, 4099
-"""Keys of the codes of a height system and of its unit."""
+VERTICAL_CRS, VERTICAL_UNIT = 4096, 4099  # keys of the codes of a height system and of its unit
 
+# Codes that stand for nothing, and for something of the file's own.
 UNDEFINED, USER_DEFINED = 0, 32767
-"""Codes that stand for nothing, and for something of the file's own."""
 
-EPSG_CODES = range(1024, USER_DEFINED)
-"""Codes that are EPSG's."""
+EPSG_CODES = range(1024, USER_DEFINED)  # codes that are EPSG's
 
-PROJECTED, GEOGRAPHIC, GEOCENTRIC = 1, 2, 3
-"""Values of the key MODEL."""
+PROJECTED, GEOGRAPHIC, GEOCENTRIC = 1, 2, 3  # values of the key MODEL
 
+# EPSG's code by GeoTIFF 1.0's own code of a height system (section 6.3.4.1 there).
 GEOTIFF_HEIGHTS = {5101: 5701, 5102: 5702, 5103: 5703, 5104: 5736, 5105: 5705, 5106: 5611}
-"""EPSG's code by GeoTIFF 1.0's own code of a height system (section 6.3.4.1 there)."""
 
-ELLIPSOIDAL = range(5001, 5034)
-"""GeoTIFF 1.0's codes of heights above an ellipsoid."""
+ELLIPSOIDAL = range(5001, 5034)  # geoTIFF 1.0's codes of heights above an ellipsoid
 
 
 @dataclass(frozen=True)
@@ -208,8 +201,7 @@ def heights_in(name: str, unit: str, factor: float) -> CRS:
     )
 
 
-WKT = 2112
-"""Number of the record that holds a WKT."""
+WKT = 2112  # number of the record that holds a WKT
 
 
 def las_crs(records: dict[int, bytes]) -> CRS | UnknownCRS | None:

@@ -370,10 +370,9 @@ def check_all_points(lower: np.ndarray, upper: np.ndarray, facts: LasFacts) -> N
         )
 
 
+# How far the points may fall short of the header's bounds, in the file's unit: some producers write
+# those of the tile.
 SHORT = 1.0
-"""How far the points may fall short of the header's bounds, in the file's unit: some producers
-write those of the tile.
-"""
 
 
 def format_list(values: Iterable[float]) -> str:

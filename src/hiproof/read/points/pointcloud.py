@@ -48,15 +48,13 @@ class Reader(NamedTuple):
 
 
 TEXT_SUFFIXES = (".xyz", ".txt", ".csv", ".pts", ".asc", ".xyzc")
+# A further kind of point file is a module and a line here. Only "las" is asked for more: parts of a
+# file, a CRS.
 READERS = {
     "las": Reader("LAS, LAZ, COPC", (".las", ".laz"), b"LASF", las.las_chunks),
     "ply": Reader("PLY", (".ply",), b"ply", ply.ply_chunks),
     "text": Reader("text (" + " ".join(TEXT_SUFFIXES) + ")", TEXT_SUFFIXES, b"", text.text_chunks),
 }
-"""A further kind of point file is a module and a line here.
-
-Only "las" is asked for more: parts of a file, a CRS.
-"""
 
 POINT_SUFFIXES = tuple(suffix for reader in READERS.values() for suffix in reader.suffixes)
 FORMAT_NAMES = " or ".join(", ".join(reader.name for reader in READERS.values()).rsplit(", ", 1))

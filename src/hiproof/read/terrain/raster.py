@@ -34,17 +34,15 @@ from ..crs import (
 from ..plausible import HIGHEST_LAND_M, LOWEST_LAND_M
 from .raster_checks import alpha_band, band_unit, height_band, read_scaling, refuse_without_position
 
-TILE_PX = 512
-"""Side (pixels) of what is read at once. GeoTIFFs are often stored in such tiles."""
+TILE_PX = 512  # Side (pixels) of what is read at once. GeoTIFFs are often stored in such tiles.
 
-TILES_KEPT = 8
-"""Tiles kept in memory (8 MB). Buildings come in order of place."""
+TILES_KEPT = 8  # Tiles kept in memory (8 MB). Buildings come in order of place.
 
+# Tiles read before work starts, to find damage: 1 GB of pixels, some 40 s of a run over hundreds of
+# thousands of buildings.
 MOST_TILES_CHECKED = 4000
-"""Tiles read before work starts, to find damage: 1 GB of pixels, some 40 s of a run over hundreds
-of thousands of buildings.
-"""
 
+# Stored values that programs write for "no data", whatever their scale and unit.
 NODATA_CODES = (
     0.0,
     -1.0,
@@ -62,25 +60,20 @@ NODATA_CODES = (
     32767.0,
     65535.0,
 )
-"""Stored values that programs write for "no data", whatever their scale and unit."""
 
+# Distance (m) from all other heights that makes one of CODES no height: ground has steps of that
+# size, but no ground between them is rare.
 ISOLATED_M = 5.0
-"""Distance (m) from all other heights that makes one of CODES no height: ground has steps of that
-size, but no ground between them is rare.
-"""
 
-FEWEST_CODED = 4
-"""Pixels with such a value, below which it is chance."""
+FEWEST_CODED = 4  # pixels with such a value, below which it is chance
 
+# Other pixels within ISOLATED_M of such a value, as a share of those that have it: blends along its
+# border.
 MOST_BETWEEN = 0.01
-"""Other pixels within ISOLATED_M of such a value, as a share of those that have it: blends along
-its border.
-"""
 
+# Tiles along each side of the raster that are compared for it, evenly spread: the answer does not
+# depend on what was read.
 SAMPLED_TILES = 4
-"""Tiles along each side of the raster that are compared for it, evenly spread: the answer does not
-depend on what was read.
-"""
 
 
 class RasterTerrain:

@@ -15,6 +15,7 @@ from typing import Any
 
 from ...errors import InputError, InputWarning
 
+# Metres in each unit that a band may name, by its spellings without blanks and punctuation.
 UNIT_NAMES = {
     "m metre meter metres meters": 1.0,
     "dm decimetre decimeter decimetres decimeters": 0.1,
@@ -26,7 +27,6 @@ UNIT_NAMES = {
     "usfeet": 1200 / 3937,
     "yd yard yards": 0.9144,
 }
-"""Metres in each unit that a band may name, by its spellings without blanks and punctuation."""
 
 METRES_IN = {name: metres for names, metres in UNIT_NAMES.items() for name in names.split()}
 NO_UNIT = ("", "unknown", "unnamed", "none", "na")

@@ -44,8 +44,8 @@ CODE_SPACES = {
     "sig3d": "http://www.sig3d.org/codelists/standard/building/2.0/_AbstractBuilding_roofType.xml",
     "adv": "https://repository.gdi-de.org/schemas/adv/citygml/Codelisten/RoofTypeTypeAdV.xml",
 }
+# Roofs of several forms, and of a form that the list does not know.
 MIXED = {"sig3d": "1130", "adv": "5000"}
-"""Roofs of several forms, and of a form that the list does not know."""
 
 
 def roof_type_code(types: Iterable[str], code_list: str = "sig3d") -> str:

@@ -25,6 +25,7 @@ from .viewed import ViewedModel
 
 DXF_VERSION = "R2010"  # the first with all that is used here; AutoCAD 2010 and later read it
 OUTLINE_LAYER, BUILDING_ID_LAYER = "Outline", "BuildingId"
+# The colour of each layer; None is white on a dark background and black on a light one.
 LAYERS = {
     ROOF: ROOF_COLOURS["gable"],
     WALL: WALL_COLOUR,
@@ -33,7 +34,6 @@ LAYERS = {
     OUTLINE_LAYER: None,
     BUILDING_ID_LAYER: None,
 }
-"""The colour of each layer; None is white on a dark background and black on a light one."""
 
 DRAWING_UNITS = {"metre": 6, "foot": 2, "US survey foot": 21}  # $INSUNITS; 0 is no unit
 INVISIBLE_EDGES = (1, 2, 8)  # bits of a 3DFACE whose fourth corner is its third

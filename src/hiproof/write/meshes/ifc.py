@@ -34,13 +34,14 @@ TOWN_SQUARE_M = 10_000.0
 FIXED_TIME = "2000-01-01T00:00:00"  # in place of the clock's, for files that do not depend on it
 PRECISION_M = 1e-4  # of coordinates, as all formats have them
 
+# The element of a building that faces other than roofs belong to, and its predefined type.
 ELEMENTS = {
     WALL: ("IfcWall", "NOTDEFINED"),
     GROUND: ("IfcSlab", "BASESLAB"),
     CEILING: ("IfcSlab", "NOTDEFINED"),
 }
-"""The element of a building that faces other than roofs belong to, and its predefined type."""
 
+# Predefined types of IfcRoof by entry of the legend; the others are user-defined.
 IFC_ROOF_TYPES = {
     "flat": "FLAT_ROOF",
     "monopitch": "SHED_ROOF",
@@ -50,7 +51,6 @@ IFC_ROOF_TYPES = {
     "mansard": "MANSARD_ROOF",
     "pyramid": "PAVILION_ROOF",
 }
-"""Predefined types of IfcRoof by entry of the legend; the others are user-defined."""
 
 IFC_VALUES = {str: "IfcText", float: "IfcReal", int: "IfcInteger", bool: "IfcBoolean"}
 

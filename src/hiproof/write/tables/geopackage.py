@@ -34,13 +34,13 @@ from .vector_layer import (
 
 BUILDINGS = "buildings"
 OUTLINE_GEOMETRY: dict[str, Any] = {"geometry_type": "MultiPolygon", "promote_to_multi": True}
+# Tables and the geometry of their rows, in pyogrio's terms.
 TABLE_GEOMETRIES: dict[str, dict[str, Any]] = {
     BUILDINGS: OUTLINE_GEOMETRY,
     "parts": OUTLINE_GEOMETRY,
     "roof_surfaces": {"geometry_type": "Polygon Z"},
     HISTORY: OUTLINE_GEOMETRY,
 }
-"""Tables and the geometry of their rows, in pyogrio's terms."""
 
 # of a table in SQLite as it comes, less the number and the geometry of a row
 MOST_COLUMNS = 1998
