@@ -96,10 +96,7 @@ class HiproofWarning(UserWarning):
 
 
 class InputWarning(HiproofWarning):
-    """Input that was used after a correction; the message says what and how much.
-
-    Points were dropped, or a CRS was assumed.
-    """
+    """Input that was used after a correction, such as points dropped; says what and how much."""
 
 
 class OutputWarning(HiproofWarning):

@@ -41,10 +41,7 @@ class SquareCells:
         return scipy.ndimage.maximum_filter(self.top(np.where(selection, values, -np.inf)), 3)
 
     def compute_local_share(self, selection: np.ndarray, width_m: float) -> np.ndarray:
-        """Return the share of `selection` (n,) among the points near each cell.
-
-        The share is flat by cells. A window of `width_m` about the cell counts as near.
-        """
+        """Return the share of `selection` (n,) among points within `width_m` of each flat cell."""
         size = 2 * round((width_m / self.cell_m - 1) / 2) + 1
         mean = [
             scipy.ndimage.uniform_filter(self.count(c).astype(float), size)

@@ -53,10 +53,7 @@ def classify_file(path: Path, out: Path, settings: Settings) -> dict[str, int]:
 
 
 def units_in(las: laspy.LasData, path: Path, settings: Settings) -> Units:
-    """Return the units of the file's coordinates.
-
-    Raises InputError for degrees, also where no CRS says that they are.
-    """
+    """Return the file's units; raises InputError for degrees, also those of no CRS."""
     crs = common_crs(
         {str(path): las_crs(read_checked_facts(path).projection)},
         parse_crs(settings.read.crs),

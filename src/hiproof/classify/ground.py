@@ -99,10 +99,7 @@ def remove_objects(lowest: np.ndarray, cell_m: float = CELL_M) -> np.ndarray:
 
 
 def fit_plane(z: np.ndarray, cell_m: float) -> np.ndarray:
-    """Return the heights at every cell of the plane through known cells of `z`.
-
-    The plane is fitted to all of them, then twice to the half farthest below.
-    """
+    """Return heights at all cells of a plane through `z`, fitted twice to its lower half."""
     column, row = (index * cell_m for index in np.indices(z.shape))
     terms, mask = np.stack([column, row, np.ones(z.shape)], axis=-1), np.isfinite(z)
     for _ in range(PLANES):
@@ -112,10 +109,7 @@ def fit_plane(z: np.ndarray, cell_m: float) -> np.ndarray:
 
 
 def open_heights(z: np.ndarray, half: int) -> np.ndarray:
-    """Return the opening of `z` by squares of 2 half + 1 cells.
-
-    The middles of the squares are known cells. Unknown ones (NaN) take no part.
-    """
+    """Return the opening of known cells of `z` by squares of 2 half + 1 cells, NaN left out."""
     mask, size = np.isfinite(z), 2 * half + 1
     eroded = scipy.ndimage.grey_erosion(
         np.where(mask, z, np.inf), size=size, mode="constant", cval=np.inf

@@ -69,11 +69,7 @@ def find_surfaces(xyz: np.ndarray) -> Surfaces:
 
 
 def thin_to_voxels(xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Thin points to one a voxel.
-
-    Returns the index (v,) of the point of each voxel whose coordinates' hash is the lowest, and the
-    voxel (n,) of each point.
-    """
+    """Thin to one point a voxel, of the lowest hash: its index (v,), each point's voxel (n,)."""
     cell = np.floor(xyz / VOXEL_M).astype(np.int64)
     cell -= cell.min(axis=0)
     size = cell.max(axis=0) + 1

@@ -17,11 +17,7 @@ from ..progress import Update, show_progress
 
 @dataclass
 class CheckedFile:
-    """The result of checking a file.
-
-    It counts valid solids and damaged buildings, and lists which solids break which rules (by
-    val3dity's codes).
-    """
+    """The result of checking a file: counts, and solids by the rules (val3dity) they break."""
 
     path: Path
     solids: int = 0

@@ -98,10 +98,7 @@ def describe_gaps(figures: Sequence[Any]) -> None:
 
 
 def print_summary(summary: dict, has_reference: bool) -> None:
-    """Print means of the figures over the buildings of each roof type.
-
-    Those against a reference have a table of their own, so that both fit a terminal of 80 columns.
-    """
+    """Print means of figures by roof type, those against a reference in a table of their own."""
     from rich.console import Console
 
     console = Console(soft_wrap=True, markup=False)  # a roof type from outside may look like markup

@@ -462,10 +462,7 @@ def label_faces(
 
 @compiled
 def inside_intervals(soup, lower, upper, px, py, dx, dy):
-    """Return sorted parameters at which a line enters and leaves a polygon.
-
-    The line is (px, py) + t (dx, dy). Their number is even.
-    """
+    """Return sorted parameters t, an even number, where (px, py) + t (dx, dy) meets a polygon."""
     cuts = np.empty(upper - lower)
     count = 0
     for e in range(lower, upper):

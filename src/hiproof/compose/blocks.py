@@ -45,10 +45,7 @@ def block(outline: shapely.Polygon, z_low: float, z_high: float) -> Solid:
 def blocks(
     outlines: Sequence[shapely.Polygon], heights: Sequence[float], z_low: float
 ) -> Solid | None:
-    """Return one solid of blocks that stand side by side over `outlines`.
-
-    Each has its own height. None where they make no valid one.
-    """
+    """Return a solid of blocks of their own `heights` over `outlines`, None if not valid."""
     whole = shapely.union_all(outlines)
     if whole.geom_type != "Polygon":
         return None

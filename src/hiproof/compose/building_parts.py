@@ -176,10 +176,7 @@ def cut_part(
 def with_base(
     solid: Solid, in_use: set[int], place_of: list[Place]
 ) -> tuple[np.ndarray, dict[Place, list[int]]]:
-    """Add ground vertices below those `in_use`.
-
-    Returns the vertices (n, 3), and all of them over each place, from below.
-    """
+    """Add ground vertices below `in_use`; returns all (n, 3), and those over each place."""
     z_base = min(
         solid.vertices[index, 2]
         for face in solid.select_faces(GROUND)

@@ -137,10 +137,7 @@ class Shell:
     def cut_ground(
         self, rings: list[list[Place]], passages: tuple[Passage, ...]
     ) -> list[GroundCell]:
-        """Return the cells of the ground, given by its `rings`.
-
-        Keeps where the feet of walls bend.
-        """
+        """Return the cells of the ground within `rings`, and keep where the feet of walls bend."""
         self.bends = self.find_bends(rings)
         return cut_cells(shapely.Polygon(rings[0], rings[1:]), passages)
 

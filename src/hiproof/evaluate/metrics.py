@@ -146,10 +146,7 @@ def compute_share_within_20cm(dz: np.ndarray, inner: Inner) -> float:
 
 
 def percentile(values: np.ndarray, share: float) -> float:
-    """Return the level that `share` of `values` (n,) lie below.
-
-    It is linear between two values. NumPy's own takes ten times as long.
-    """
+    """Return the level that `share` of `values` (n,) lie below, ten times as fast as NumPy."""
     place = share * (len(values) - 1)
     lower = int(place)
     below, above = np.partition(values, (lower, min(lower + 1, len(values) - 1)))[
@@ -159,10 +156,7 @@ def percentile(values: np.ndarray, share: float) -> float:
 
 
 def nodata_share(xy: np.ndarray, outline: shapely.Polygon) -> float:
-    """Return the share of 1 m cells in `outline` without points.
-
-    Cells count whose centre is in the outline. `xy` is (n, 2 or 3). It is NaN without cells.
-    """
+    """Return the share of cells (1 m, centre in `outline`) without points, NaN without cells."""
     west, south, east, north = np.array(outline.bounds) / CELL_M
     west, south = math.floor(west), math.floor(south)
     columns, rows = math.ceil(east) - west, math.ceil(north) - south

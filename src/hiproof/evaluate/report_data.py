@@ -148,10 +148,7 @@ def mesh_data(run: EvaluatedRun, types: list[str], origin: np.ndarray) -> dict[s
 
 
 def roof_places(model: BuildingModel, part: np.ndarray, types: list[str]) -> list[int]:
-    """Return each triangle's roof type as its place among `types`, from 1 on.
-
-    `part` (t,) is the triangle's part. It is 0 for walls.
-    """
+    """Return each triangle's roof type as its place among `types`, from 1 on, 0 for walls."""
     return [
         0 if k < 0 else 1 + types.index(model.part_types.get(k, model.roof_type))
         for k in part.tolist()

@@ -29,10 +29,7 @@ class PointGrid:
     """
 
     def __init__(self, xy: np.ndarray, cell_m: float = INDEX_CELL_M):
-        """Index `xy` (n, 2 or more) by square cells.
-
-        Coordinates are world or local metres, all finite. Further columns are ignored.
-        """
+        """Index finite `xy` (n, 2 or more) in metres by square cells; more columns are ignored."""
         self.xy, self.cell_m = np.ascontiguousarray(xy, float), float(cell_m)
         self.origin, (self.columns, self.rows) = (
             cell_range(self.xy, cell_m) if len(self.xy) else ((0, 0), (1, 1))

@@ -63,11 +63,7 @@ class Solid:
         return FlatShell(self.vertices - self.vertices.mean(axis=0), *self.flatten())
 
     def flatten(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the shell as arrays; see `FlatShell`.
-
-        These are the vertex indices of all rings one after the other, the start of each ring, and
-        the first ring of each face.
-        """
+        """Return the rings' vertices end to end, each ring's start, each face's first ring."""
         rings = [ring for face in self.faces for ring in face.rings]
         index = np.array([vertex for ring in rings for vertex in ring], np.int64)
         ring_start = np.cumsum([0, *map(len, rings)], dtype=np.int64)

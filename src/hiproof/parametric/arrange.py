@@ -81,11 +81,7 @@ def split_part(
 
 
 def merged_parts(item: dict[str, Any], other: dict[str, Any]) -> dict[str, Any]:
-    """Merge two parts into one.
-
-    It has the type, direction and heights of the larger one, over the rectangle around both, and
-    roofs what both roofed.
-    """
+    """Merge two parts as the larger one is, over the rectangle and the outlines of both."""
     main, side = sorted(
         map(with_sizes, (item, other)),
         key=lambda part: sum(make_polygon(outline).area for outline in part["outlines"]),
@@ -228,10 +224,7 @@ def with_recess(
 
 
 def replace_part(parts: list[Any], index: int, changed: dict[str, Any]) -> list[Any]:
-    """Return the parts with `changed` in place of part `index`.
-
-    Parts that left out its old place leave out its new one instead.
-    """
+    """Return the parts with `changed` as part `index`; they leave out its place, if the old."""
     old = roofed_by(parts[index])
     rectangle = cover_rectangle(changed) if "outlines" not in changed else roofed_by(changed)
     neighbours = [

@@ -110,10 +110,7 @@ def change_type(part: dict[str, Any], kind: str, sizes: dict[str, float]) -> dic
 
 
 def side_by_side(part: dict[str, Any]) -> dict[str, Any]:
-    """Return the part with each side's own pitch and eave.
-
-    They replace the catalogue's parameters. Raises InputError where it has none.
-    """
+    """Return the part with pitches and eaves of sides; raises InputError where it has none."""
     parameters = part["parameters"]
     if SIDED & parameters.keys():
         return part

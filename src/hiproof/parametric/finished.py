@@ -60,11 +60,7 @@ class Run:
         return (described.building for described in self.describe())
 
     def describe(self, damaged: Damaged = refuse) -> Iterator[Described]:
-        """Yield every building with all that files need of it.
-
-        Those that cannot be read or built are reported to `damaged`, which refuses the run by
-        default, and left out.
-        """
+        """Yield every building with all that files need; `damaged` gets, or refuses, others."""
         if is_parameters(self.path):
             return describe_parametric(self.path, self.head, damaged)
         return describe_solids(self.path, self.head, damaged)

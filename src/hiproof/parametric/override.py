@@ -76,10 +76,7 @@ RANGES = {
 
 @dataclass(frozen=True)
 class Override:
-    """A checked override; None or empty where it fixes nothing.
-
-    None or empty where it says nothing. `fixed` holds ridge_height and eave_height too.
-    """
+    """A checked override, None or empty where it fixes nothing; `fixed` also has heights."""
 
     id: str
     type: str | None = None
@@ -163,10 +160,7 @@ def possible(record: Mapping[str, Any], key: str, where: str) -> float | None:
 
 
 def refuse_contradictions(record: Mapping[str, Any], has_list: bool, where: str) -> None:
-    """Raise InputError where an override contradicts itself.
-
-    Two of its values exclude each other, or one is neither yes nor no.
-    """
+    """Raise InputError where values exclude each other, or one is neither yes nor no."""
     if record.get("leave_out", False) not in (True, False):
         raise InputError(
             f"expected true or false as leave_out of {where}, got {excerpt(record['leave_out'])}; "
@@ -242,10 +236,7 @@ def overridden(
     ground: np.ndarray | None = None,
     neighbours: Sequence[shapely.Polygon] = (),
 ) -> Building:
-    """Reconstruct a building with its override.
-
-    Arguments and result are those of `hiproof.reconstruct`.
-    """
+    """Reconstruct a building with its override; the rest is as in `hiproof.reconstruct`."""
     points, settings = as_xyz(points), settings or Settings()
     building = start_building(footprint, id)
     if override.leave_out:
@@ -273,10 +264,7 @@ def lies_under(building: Building, z_ground: float | None) -> bool:
 
 
 def remark_given_ground(building: Building, z_ground: float | None, terrain: Any) -> str:
-    """Return a remark where the given ground is far from the terrain's.
-
-    The terrain counts under the building's outline. The remark is empty otherwise.
-    """
+    """Return a remark where the given ground is far from the terrain under it, else ""."""
     if z_ground is None or terrain is None or building.built is None:
         return ""
     heights, source = query_terrain(terrain, shapely.get_coordinates(building.roof.world_outline))

@@ -136,10 +136,7 @@ def read_roof(parts: list[Any], outline: shapely.Polygon | None, origin: np.ndar
 
 
 def read_part(record: Any, outline: shapely.Polygon, label: str) -> Part:
-    """Read a part with its planes.
-
-    Without outlines of its own it roofs what its rectangle covers of the building's.
-    """
+    """Read a part with its planes, over the building's outline if it has none of its own."""
     refuse_other_keys(record, "part", label)
     kind = text_at(record, "type")
     parameters = numbers_by_name(record.get("parameters") or {}, f"the parameters of {label}")
@@ -319,10 +316,7 @@ def read_values(record: Any, table: str, label: str) -> dict[str, Any]:
 
 
 def refuse_other_types(record: Mapping[str, Any], table: str, label: str = "") -> None:
-    """Raise InputError where a value is of another type than the table declares.
-
-    No geometry is made. Objects within are not looked at.
-    """
+    """Raise InputError where values are not of the types that the table declares for them."""
     for attribute in TABLES[table].attributes:
         name, type, value = attribute.name, attribute.type, record.get(attribute.name)
         if attribute.kind == "text":

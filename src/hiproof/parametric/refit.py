@@ -81,10 +81,7 @@ def select_inside(roof: Roof, points: np.ndarray) -> np.ndarray:
 def refit_parts(
     roof: Roof, parts: list[Any], points: np.ndarray, fixed: Mapping[int, Collection[str]]
 ) -> list[Any]:
-    """Fit the objects `parts`, of which `roof` was made, to `points` (n, 3).
-
-    Points are about the roof's origin. Raises FitError for fewer than three.
-    """
+    """Fit `parts` of `roof` to `points` (n, 3) about its origin; FitError below three."""
     unknowns = list_unknowns(roof.parts, fixed)
     if len(points) < FEWEST_REFIT_POINTS:
         raise FitError(
@@ -237,10 +234,7 @@ class Heights:
         return RefitSurface(gaps * leans, leans, part, row, result)
 
     def leans(self, part: np.ndarray, row: np.ndarray, planes: list[np.ndarray]) -> np.ndarray:
-        """Return the share (n,) of heights over curved parts that is at right angles.
-
-        It is 1 over others: points lie as far off in plan as in height, which steep slopes show.
-        """
+        """Return the share (n,) of heights that is at right angles: 1 but over curved parts."""
         result = np.ones(len(part))
         for index in (k for k, one in enumerate(self.parts) if one.type in CURVED):
             over = part == index

@@ -68,10 +68,7 @@ class SkippedValues:
 def warn_of_values(
     rows: Iterable[tuple[str, Mapping[str, Any]]], columns: list[NumberColumn], source: str
 ) -> None:
-    """Warn of the values in columns that are left out.
-
-    `rows` are ids with attributes. Empty cells are no values.
-    """
+    """Warn of values of `rows` (ids, attributes) that columns leave out, but for empty ones."""
     skipped = SkippedValues(source)
     for id, attributes in rows if columns else ():
         for column in columns:

@@ -83,10 +83,7 @@ class Body:
 
 
 def list_halfspaces(piece: Piece) -> np.ndarray:
-    """Return outline edges, then planes, as rows (nx, ny, nz, d).
-
-    n . p <= d inside. Raises InputError when not convex.
-    """
+    """Return rows (nx, ny, nz, d), n . p <= d inside, of a piece; InputError if not convex."""
     ring = shapely.get_coordinates(piece.outline.exterior)
     if len(piece.outline.interiors):
         raise InputError(

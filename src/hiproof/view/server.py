@@ -31,10 +31,7 @@ VIEW_ASSETS = {
 
 
 def make_server(tileset: Path, title: str, port: int = 0) -> LoopbackServer:
-    """Make a server of the page at `/` and of the folder `tileset`.
-
-    0 is any free `port`. Raises InputError where the port is taken.
-    """
+    """Make a server of the page and folder `tileset`; `port` 0 is any; InputError if taken."""
     return LoopbackServer(
         partial(ViewHandler, directory=str(tileset), page=render_page(title)), port
     )

@@ -77,10 +77,7 @@ def read_solids(path: str | Path, damaged: Damaged = refuse) -> Iterator[tuple[s
 
 
 def read_building_solids(path: Path, damaged: Damaged, units: Units) -> Iterator[tuple[str, Solid]]:
-    """Yield (id, Solid) for each shell of the buildings in a CityGML file.
-
-    `units` are those of its coordinates. Installations are left out; see `read_solids`.
-    """
+    """Yield (id, Solid) of buildings' shells in a CityGML file; see `read_solids`."""
     return citygml_solids(path, damaged, BUILDING_OBJECT, units)
 
 

@@ -100,10 +100,7 @@ def meets(box: Sequence[float] | None, extent: shapely.Geometry) -> bool:
 
 
 def find_asset(item: Document, suffix: str) -> str:
-    """Return the address of an item's file whose name ends in `suffix`.
-
-    One by HTTP comes before others. Raises InputError where it lists none.
-    """
+    """Return the address of an item's file of that `suffix`, by HTTP first; else InputError."""
     assets = item.content.get("assets") or {}
     ways = [urljoin(item.address, asset.get("href") or "") for asset in assets.values()]
     ways = [way for way in ways if urlsplit(way).path.endswith(suffix)]

@@ -205,10 +205,7 @@ WKT = 2112  # number of the record that holds a WKT
 
 
 def las_crs(records: dict[int, bytes]) -> CRS | UnknownCRS | None:
-    """Return the CRS that the records of user LASF_Projection define, or None.
-
-    Records come by number. Heights may come from the keys beside a WKT.
-    """
+    """Return the CRS of records (by number) of LASF_Projection, heights of keys, or None."""
     text = decode_wkt(records.get(WKT, b""))
     result, faults = [], []
     for is_there, read in (

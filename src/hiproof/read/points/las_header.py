@@ -345,11 +345,7 @@ def walk_pages(file: BinaryIO, facts: LasFacts, page: int, page_bytes: int) -> n
 
 
 def check_points(xyz: np.ndarray, facts: LasFacts) -> tuple[np.ndarray, np.ndarray]:
-    """Return the lowest and highest coordinates, (3,) each, of points (n, 3).
-
-    They are the header's where there are no points. Raises Implausible where points lie outside the
-    header's bounds.
-    """
+    """Return lowest and highest (3,) of points (n, 3); Implausible outside the header's."""
     lower, upper = compute_bounds(xyz) if len(xyz) else (facts.mins, facts.maxs)
     if not ((lower >= facts.mins - facts.rounding) & (upper <= facts.maxs + facts.rounding)).all():
         raise Implausible(

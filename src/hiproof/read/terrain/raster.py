@@ -218,11 +218,7 @@ class RasterTerrain:
         )
 
     def knows_any(self, xy_world: np.ndarray) -> bool:
-        """Return whether there is a height at any of `xy_world` (n, 2).
-
-        Raises DamagedRaster where it cannot be read. Of more than MOST_TILES_CHECKED tiles so many
-        are read, evenly spread.
-        """
+        """Return whether any of `xy_world` (n, 2), sampled, has a height; or DamagedRaster."""
         row, column, inside = self.pixels_at(xy_world)
         places = np.column_stack([row, column])[inside]
         tiles, index = np.unique(np.floor(places / TILE_PX), axis=0, return_inverse=True)

@@ -38,11 +38,7 @@ def face_normals(vertices: np.ndarray, faces: Sequence[Face]) -> np.ndarray:
 def faces_triangles(
     vertices: np.ndarray, faces: Sequence[Face], normals: np.ndarray | None = None
 ) -> list[np.ndarray]:
-    """Return the triangles of every face, all cut by one call.
-
-    They are as from `face_triangles`. `normals` are those of `face_normals`, where a caller has
-    them.
-    """
+    """Return every face's triangles as `face_triangles`, by one call, by known `normals`."""
     neighbours = [number for number, face in enumerate(faces) if not is_triangle(face)]
     normals = face_normals(vertices, faces) if normals is None else normals
     tiles = iter(
