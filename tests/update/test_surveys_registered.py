@@ -65,6 +65,30 @@ def test_however_many_houses_grow_the_shift_is_that_of_the_ground(seed, share, s
     assert found.noise.roof < 0.05
 
 
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.6])
+@pytest.mark.parametrize("count", [10, 20])
+def test_half_a_metre_aside_is_found_where_most_houses_grew(count, share):
+    errors = []
+    for seed in range(20):
+        shift = np.array([*np.random.default_rng(seed).choice([-0.5, 0.5], 2), 0.05])
+        found = register_surveys(draw_samples(seed, draw_rises(seed, count, share), shift), READ)
+        errors.append(np.abs(found.clear_xyz - shift).max())
+    assert sum(error < 0.15 for error in errors) >= 19, np.sort(errors)[-3:]
+
+
+@pytest.mark.parametrize(("count", "share"), [(3, 0.0), (4, 0.25), (6, 0.6)])
+@pytest.mark.parametrize("seed", range(8))
+def test_a_shift_aside_that_few_roofs_show_is_right_or_warned_of(seed, count, share):
+    shift = np.array([*np.random.default_rng(seed).choice([-0.5, 0.5], 2), 0.05])
+    samples = draw_samples(seed, draw_rises(seed, count, share), shift)
+    found = register_surveys(samples, READ)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        found.warn("survey of 2024-05-01")
+    is_right = np.abs(found.clear_xyz - shift).max() < 0.15
+    assert is_right or any("--shift EAST,NORTH,UP" in str(w.message) for w in caught)
+
+
 @pytest.mark.parametrize("kind", ["a slope", "a valley"])
 @pytest.mark.parametrize("percent", [10, 20, 30])
 @pytest.mark.parametrize(("share", "aside"), [(0.0, 0.5), (0.6, 0.3)])

@@ -2,7 +2,7 @@
 
 What cannot have grown comes first: the median height of the new ground over the earlier one. New
 points lie over the earlier roofs by dz - a dx - b dy, where (a, b) is the roof's slope and (dx, dy,
-dz) the shift. A robust least squares over a sample of buildings estimates it, beginning at the
+dz) the shift. A robust least squares over a sample of buildings estimates it, starting at the
 ground's height, so roofs that changed are outliers however many they are. A shift that ground and
 roofs do not share, or that few roofs carry, is not taken off. A hash of places draws the sample: it
 does not depend on tiles.
@@ -11,6 +11,7 @@ does not depend on tiles.
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 import warnings
 from collections.abc import Iterable
@@ -38,11 +39,23 @@ from .clusters import flag_cells
 MOST_POINTS = 400
 """Points of a building that are used: more tell the roof's own errors rather than the shift."""
 
-SHIFT_SCALES_M = (1.0, 0.5, 0.25)
-"""Residuals beyond are outliers, from coarse to fine (m)."""
+SHIFT_SCALE_M = 0.25
+"""Residuals beyond are outliers (m)."""
 
-PRIOR_M = 0.2
-"""Standard deviation (m) of the horizontal shift before any roof is seen; flat roofs tell none."""
+STARTS_M, SHIFT_ROUNDS = (-0.5, 0.0, 0.5), 8
+"""Shifts (m) to the east and to the north from which an estimate starts, and its steps. Where most
+roofs rose, some of these fit a shift, too, so the best of nine estimates counts.
+"""
+
+USUAL_ASIDE_M = 0.2
+"""Horizontal difference (m) that two surveys usually have."""
+
+PRIOR_M = 2 * USUAL_ASIDE_M
+"""Standard deviation (m) of the horizontal shift before any roof is seen; flat roofs tell none. A
+tighter one halves the shift of few roofs."""
+
+PRIOR = np.diag([PRIOR_M**-2, PRIOR_M**-2, 0.0])
+"""What is known of a shift before, as a normal matrix (1/m2)."""
 
 ROOF_ERROR_M = 0.05
 """Standard deviation (m) of what points say of a building, or of the ground: that of two strips."""
@@ -57,12 +70,6 @@ points that were chosen otherwise."""
 CARRIED_BESIDE_GROUND, CARRIED_ALONE = 0.1, 2 / 3
 """Least share of the roofs' area that has to lie where a shift puts it: where the ground shows the
 same shift, and where there is no ground."""
-
-GROUND_ROUNDS = 3
-"""Times that the ground's height and the shift aside are estimated: on slopes each bends the other.
-"""
-
-HELD_WEIGHT = 1e9  # weight (1/m2) of a height that is not to move
 
 FEWEST_ROOFS = 8
 """Roofs from which on their noise is estimated rather than assumed, and carry a shift alone."""
@@ -167,6 +174,15 @@ class SurveyShift:
                 "and if the shift is known, --shift EAST,NORTH,UP",
                 InputWarning,
             )
+        x, y, _ = self.xyz
+        is_estimated = not self.doubt and self.sigma[0] > 0
+        if is_estimated and self.agreeing < FEWEST_ROOFS and math.hypot(x, y) > USUAL_ASIDE_M:
+            warnings.warn(
+                f"{name}: the shift of {x:+.2f} m to the east and {y:+.2f} m to the north rests on "
+                f"{self.agreeing} of {self.roofs} sampled roofs. So few may show their own changes "
+                "or another shift; if it is known, pass --shift EAST,NORTH,UP",
+                InputWarning,
+            )
         if self.tilt:
             warnings.warn(
                 f"{name}: the surveys are tilted to each other, by {self.tilt:.2f} m from one end "
@@ -226,14 +242,13 @@ def register_surveys(samples: Iterable[SampledRoof], read: ReadSettings) -> Surv
     ground = measure_ground(samples)
     heights = [float(np.median(residuals)) for _, residuals in rows]
     if fixed is not None:
-        shift, sigma, level = np.array(fixed), np.zeros(3), measure_level(ground, np.array(fixed))
-    elif len(ground):
-        shift, sigma, level = solve_with_ground(rows, ground)
+        shift, sigma = np.array(fixed), np.zeros(3)
     else:
-        shift, sigma, level = *solve_shift(rows, float(np.median(heights)), False), 0.0
+        shift, sigma = solve_shift(rows, ground, float(np.median(heights)))
+    level = measure_level(ground, shift)
     ground[:, 2] += ground[:, 3:] @ shift[:2]
     offsets = np.array([np.median(residuals - design @ shift) for design, residuals in rows])
-    is_agreeing = np.abs(offsets) < SHIFT_SCALES_M[-1]
+    is_agreeing = np.abs(offsets) < SHIFT_SCALE_M
     result = SurveyShift(
         tuple(np.round(shift, 4).tolist()),
         tuple(np.round(sigma, 4).tolist()),
@@ -250,26 +265,10 @@ def register_surveys(samples: Iterable[SampledRoof], read: ReadSettings) -> Surv
         result = dataclasses.replace(result, doubt=doubt)
     moved = [sample._replace(new=sample.new - result.clear_xyz) for sample, _ in pairs]
     offsets = offsets + shift[2] - result.clear_xyz[2]
-    unchanged = [
-        s for s, value in zip(moved, offsets, strict=True) if abs(value) < SHIFT_SCALES_M[-1]
-    ]
+    unchanged = [s for s, value in zip(moved, offsets, strict=True) if abs(value) < SHIFT_SCALE_M]
     noise = measure_noise(unchanged)
     tilted = max(noise.roof, round(result.tilt / math.sqrt(12), 4))  # of evenly spread places
     return dataclasses.replace(result, noise=dataclasses.replace(noise, roof=tilted))
-
-
-def solve_with_ground(
-    rows: list[tuple[np.ndarray, np.ndarray]], ground: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, float]:
-    """Solve for the shift whose height is that of the `ground` (n, 5).
-
-    Returns it, its standard deviations, and the height.
-    """
-    shift = np.zeros(3)
-    for _ in range(GROUND_ROUNDS):
-        level = measure_level(ground, shift)
-        shift, sigma = solve_shift(rows, level, True)
-    return shift, sigma, level
 
 
 def measure_level(ground: np.ndarray, shift: np.ndarray) -> float:
@@ -365,33 +364,44 @@ def make_rows(sample: SampledRoof) -> tuple[np.ndarray, np.ndarray]:
 
 
 def solve_shift(
-    rows: list[tuple[np.ndarray, np.ndarray]], start_m: float, has_ground: bool
+    rows: list[tuple[np.ndarray, np.ndarray]], ground: np.ndarray, roofs_m: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the shift (3,) and its standard deviations from the rows of buildings.
 
-    Every building has the weight of one observation of ROOF_ERROR_M; errors of its points go
-    together, so the variance is that between buildings (a sandwich estimate). The height begins at
-    `start_m`. That of the ground is held in the coarse steps alone: with it to the end, slopes that
-    face one way would be moved aside where they rose.
+    Each estimate starts at the height of the `ground` (n, 5), or without any at that of the roofs.
+    Errors of a building's points go together, so the variance is that between buildings (a sandwich
+    estimate).
     """
-    shift = np.array([0.0, 0.0, start_m])
-    for scale in (*SHIFT_SCALES_M, *SHIFT_SCALES_M[-1:] * 2):
-        is_held = has_ground and scale > SHIFT_SCALES_M[-1]
-        prior = np.diag([PRIOR_M**-2, PRIOR_M**-2, HELD_WEIGHT if is_held else 0.0])
-        normal, right, gradients = prior.copy(), np.zeros(3), []
-        for design, residuals in rows:
-            misfit = residuals - design @ shift
-            weight = np.maximum(1 - (misfit / scale) ** 2, 0.0) ** 2
-            weight /= ROOF_ERROR_M**2 * len(residuals)
-            normal += design.T @ (weight[:, None] * design)
-            gradients.append(design.T @ (weight * misfit))
-            right += gradients[-1]
-        right -= prior @ (shift - [0.0, 0.0, start_m])
-        inverse = np.linalg.inv(normal + 1e-9 * np.eye(3))
-        shift = shift + inverse @ right
-    between = np.array(gradients).T @ np.array(gradients) + prior
-    covariance = inverse @ between @ inverse
+    found = []
+    for start in itertools.product(STARTS_M, STARTS_M):
+        shift = np.array([*start, 0.0])
+        shift[2] = measure_level(ground, shift) if len(ground) else roofs_m
+        for _ in range(SHIFT_ROUNDS):
+            _, inverse, gradients = weigh_rows(rows, shift)
+            shift = shift + inverse @ (gradients.sum(axis=0) - PRIOR @ shift)
+        found.append((weigh_rows(rows, shift)[0], shift))
+    shift = min(found, key=lambda item: item[0])[1]
+    _, inverse, gradients = weigh_rows(rows, shift)
+    covariance = inverse @ (gradients.T @ gradients + PRIOR) @ inverse
     return shift, np.sqrt(np.diag(covariance) + ROOF_ERROR_M**2 / len(rows) / 4)
+
+
+def weigh_rows(
+    rows: list[tuple[np.ndarray, np.ndarray]], shift: np.ndarray
+) -> tuple[float, np.ndarray, np.ndarray]:
+    """Return the price of a shift (3,), the inverse of its normal matrix, and gradients (n, 3).
+
+    Every building has the weight of one observation of ROOF_ERROR_M, with Tukey's biweight.
+    """
+    normal, gradients, price = PRIOR.copy(), [], float(shift @ PRIOR @ shift) / 2
+    for design, residuals in rows:
+        misfit = residuals - design @ shift
+        near = np.maximum(1 - (misfit / SHIFT_SCALE_M) ** 2, 0.0)
+        weight = near**2 / (ROOF_ERROR_M**2 * len(residuals))
+        normal += design.T @ (weight[:, None] * design)
+        gradients.append(design.T @ (weight * misfit))
+        price += (SHIFT_SCALE_M / ROOF_ERROR_M) ** 2 * float((1 - near**3).mean()) / 6
+    return price, np.linalg.inv(normal + 1e-9 * np.eye(3)), np.array(gradients)
 
 
 def measure_noise(samples: list[SampledRoof]) -> SurveyNoise:
