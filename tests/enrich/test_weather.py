@@ -84,6 +84,14 @@ def spoil(hours=slice(None), **factors):
         (spoil(ghi=lambda v: 3.6 * v, dhi=lambda v: 3.6 * v), "beyond what reache"),
         (spoil(**dict.fromkeys(("ghi", "dhi", "dni"), 0)), "got only 0.0% of what reaches the atm"),
         (spoil(**dict.fromkeys(("ghi", "dhi", "dni"), lambda v: v / 1000)), "got only 0.0% of wha"),
+        (
+            spoil(**dict.fromkeys(("ghi", "dhi", "dni"), lambda v: v / 3.6)),
+            "got only 1[0-9].[0-9]%",
+        ),
+        (
+            spoil(**dict.fromkeys(("ghi", "dhi", "dni"), lambda v: v / 2)),
+            "got no clear hours: the br",
+        ),
         (spoil(slice(4800, 5544), ghi=0, dhi=0, dni=0), "got 31 days without radi.*on 20 July"),
         (spoil(ghi=lambda v: np.roll(v, 1)), "beyond what reaches the atmosphere at its hours"),
         (

@@ -38,7 +38,11 @@ GREATEST_GAP = 0.15
 share of the year: 0.003 in pvlib's TMY3 files, 0.06 where hours are half of one off.
 """
 GREATEST_GAP_WM2 = 300.0  # of either in one hour (W/m2); up to 250 where hours are one off
-LEAST_CLEARNESS = 0.1  # of the radiation above the atmosphere: 0.3 in the dullest climates on Earth
+LEAST_CLEARNESS = 0.2  # of the radiation above the atmosphere: 0.3 in the dullest climates on Earth
+BRIGHTEST, LEAST_BRIGHTNESS = 0.99, 0.5
+"""Quantile of the hours with a high sun, and the share of the radiation above the atmosphere that
+it has to reach: clear skies let 0.7 to 0.8 pass, and every climate has clear hours.
+"""
 DAYLIGHT_RISE = 0.25  # sine of the sun's elevation (15 degrees) at noon from which no day is dark
 
 
@@ -204,6 +208,8 @@ def refuse_other_sun(weather: Weather, path: str) -> None:
     gaps, excess = np.abs(ghi - dhi - dni * rise), np.maximum(ghi - ceiling * rise, 0.0)
     share = total / float((ceiling * rise).sum())
     days, noons = ghi.reshape(-1, 24).sum(axis=1), rise.reshape(-1, 24).max(axis=1)
+    is_high = rise > DAYLIGHT_RISE
+    brightness = float(np.quantile((ghi / ceiling)[is_high] / rise[is_high], BRIGHTEST))
     is_dark = (days == 0.0) & (noons > DAYLIGHT_RISE)
     worst = int(np.maximum(np.maximum(gaps, excess), np.maximum(dni - ceiling, 0.0)).argmax())
     if excess.sum() > GREATEST_EXCESS * total or excess[worst] > GREATEST_GAP_WM2:
@@ -220,6 +226,11 @@ def refuse_other_sun(weather: Weather, path: str) -> None:
         got = f"diffuse and direct radiation {gaps.sum() / total:.0%} off the global"
     elif share < LEAST_CLEARNESS:
         got = f"only {share:.1%} of what reaches the atmosphere in a year"
+    elif brightness < LEAST_BRIGHTNESS:
+        got = (
+            f"no clear hours: the brightest have {brightness:.0%} of what reaches the atmosphere, "
+            "so the unit is wrong, W/m2 are usual"
+        )
     elif is_dark.any():
         day = weather.times[24 * int(is_dark.argmax())]
         got = (
