@@ -21,7 +21,7 @@ from hiproof.formats import (
 )
 from hiproof.settings import Settings
 from hiproof.write.attribute_list import files_text
-from hiproof.write.citygml.version3 import write_citygml3
+from hiproof.write.citygml.version3 import CityGML3Writer
 from hiproof.write.fragments import Fragment
 from hiproof.write.head import FileHead
 from hiproof.write.run_files import fragments, join_fragments, write_all
@@ -112,5 +112,5 @@ def test_citygml_is_written_in_the_versions_asked_for(tmp_path, version, files):
     building = make_building(gable_house(), "a")
     join_fragments(request, [fragments(building, ("a", "a"), head)[1]], head)
     if version == "both":
-        write_citygml3(tmp_path / "alone.gml", [building], "EPSG:7415")
+        CityGML3Writer(tmp_path / "alone.gml", FileHead("EPSG:7415")).add_all([building])
         assert (tmp_path / "alone.gml").read_bytes() == request["citygml3"].read_bytes()

@@ -17,9 +17,9 @@ from handmade import make_lost_building
 from hiproof.cli.load import load
 from hiproof.errors import InputError, OutputError
 from hiproof.model.roof_figures import roof_figures
+from hiproof.parametric.finished import load_postgis
 from hiproof.parametric.run import build_file
 from hiproof.read.outlines.footprints import footprint_crs, read_footprints
-from hiproof.view.loading import load_postgis
 from hiproof.write import write_all, write_parameters
 from postgis_server import explain_absence, running
 from sample_models import write_sample_run

@@ -24,8 +24,8 @@ from hiproof.cli.view import open_tiles
 from hiproof.edit.desk import Desk
 from hiproof.errors import HiproofError
 from hiproof.log import LOGGER
+from hiproof.parametric.finished import load_postgis
 from hiproof.parametric.run import build_file
-from hiproof.view.loading import load_postgis
 from hiproof.write.described import Described
 from hiproof.write.naming import FileUnits
 from hiproof.write.tables.postgis import Load, database_rows
@@ -151,7 +151,7 @@ def load(folder: Path) -> None:
         assert not any(b"\\u0000" in text for text in texts)
         return len(texts)
 
-    with patch("hiproof.view.loading.load_tables", send):
+    with patch("hiproof.write.tables.postgis.load_tables", send):
         load_postgis(folder, "", damaged=sentence)
 
 

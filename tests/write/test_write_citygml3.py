@@ -11,9 +11,10 @@ from lxml import etree
 from handmade import box, courtyard, gable_house, make_building, make_lost_building
 from hiproof.read.models.solids import read_solids
 from hiproof.write.citygml.version2 import NAMESPACES as OLD
-from hiproof.write.citygml.version2 import write_citygml
-from hiproof.write.citygml.version3 import ID, NAMESPACES_3, upgrade_member, write_citygml3
+from hiproof.write.citygml.version2 import CityGMLWriter
+from hiproof.write.citygml.version3 import ID, NAMESPACES_3, CityGML3Writer, upgrade_member
 from hiproof.write.fragments import Fragment
+from hiproof.write.head import FileHead
 
 SCHEMA = Path(__file__).parents[3] / "shared" / "schemas" / "citygml3" / "CityGML.xsd"
 HREF = f"{{{NAMESPACES_3['xlink']}}}href"
@@ -50,9 +51,9 @@ def street():
 @pytest.fixture(scope="module")
 def files(tmp_path_factory):
     folder = tmp_path_factory.mktemp("citygml")
-    options = {"creation_date": datetime.date(2020, 2, 3)}
-    write_citygml(folder / "old.gml", street(), "EPSG:7415", **options)
-    write_citygml3(folder / "new.gml", street(), "EPSG:7415", **options)
+    head = FileHead("EPSG:7415", creation_date=datetime.date(2020, 2, 3))
+    for name, writer in (("old", CityGMLWriter), ("new", CityGML3Writer)):
+        writer(folder / f"{name}.gml", head).add_all(street())
     return folder / "old.gml", folder / "new.gml"
 
 
@@ -170,6 +171,6 @@ def test_parts_and_level_0_are_told_in_the_newer_way():
 
 
 def test_no_buildings_make_an_empty_model(tmp_path):
-    write_citygml3(tmp_path / "a.gml", [])
+    CityGML3Writer(tmp_path / "a.gml", FileHead()).add_all([])
     root = etree.parse(tmp_path / "a.gml").getroot()
     assert root.tag == f"{{{NAMESPACES_3['core']}}}CityModel" and len(root) == 0

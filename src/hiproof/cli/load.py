@@ -31,7 +31,7 @@ def load(
     left_out = SkippedBuildings()
     how = {"replace": replace, "append": append}
     with show_progress("load"):
-        from ..view.loading import load_postgis
+        from ..parametric.finished import load_postgis
 
         count = load_postgis(folder, database, prefix, left_out, run, **how)
     tables = f"{prefix}_buildings, {prefix}_roofs and {prefix}_parts"

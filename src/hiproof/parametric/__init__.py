@@ -7,7 +7,7 @@ schema      the JSON schema of that file
 record      the JSON object of one building checked, and its parts made
 building    the object built: composed, checked, measured, as a run does
 run         a file of parameters into the files of a run
-finished    finished models read building by building, of any file
+finished    finished models read building by building, of any file, and loaded into PostGIS
 change      one part changed: another type, a height, a side
 arrange     parts put otherwise: cut in two, joined, a dormer, a recess
 edit        a building with another part, or without one

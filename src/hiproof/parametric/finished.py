@@ -37,6 +37,7 @@ from .file import DAMAGED, HEAD_KEY, opened_parameters
 # Share of a face's area that plan shows. A face that shows less is upright: rounded coordinates
 # tilt a wall by some 1e-4.
 PLAN_SHARE_UPRIGHT = 0.001
+MOST_SRID = 998_999  # of a reference system of PostGIS
 
 
 @dataclass(frozen=True)
@@ -209,3 +210,29 @@ def trace_piece(solid: Solid, face: Face) -> Piece | None:
     x, y, z = ring.mean(axis=0)
     outline = repair_polygons(solid.project_face(face))
     return Piece(outline, np.array([[a, b, z - a * x - b * y]]))
+
+
+def load_postgis(
+    folder: Path,
+    dsn: str,
+    prefix: str = "hiproof",
+    damaged: Damaged = refuse,
+    name: str | None = None,
+    **how: bool,
+) -> int:
+    """Replace a prefix's tables in a database by the models of `folder`.
+
+    They are PREFIX_buildings, PREFIX_roofs and PREFIX_parts of the database at `dsn`. `name` is
+    that of the run in the tables, its folder's by default; `how` is `replace` or `append` (see
+    Load). A damaged building is told to `damaged`, which refuses the run by default, and left out.
+    Raises InputError for a folder without models, OutputError for a database that cannot be written
+    or holds another run.
+    """
+    from ..write import naming
+    from ..write.tables.postgis import Load, load_tables
+
+    run, place = open_run(folder), Path(folder).resolve()
+    code = (naming.reference_system(run.head.crs_of_files) or "").rpartition("/")[2]
+    srid = int(code) if code.isdigit() and int(code) <= MOST_SRID else 0
+    loaded = Load(name or place.name, str(place), prefix, srid, **how)
+    return load_tables(dsn, run.describe(damaged), run.head.units, loaded, damaged)

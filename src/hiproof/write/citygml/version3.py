@@ -7,19 +7,12 @@ It has other names, another order, and an id for every geometry. So everything t
 from __future__ import annotations
 
 import dataclasses
-import datetime
-import os
-from collections.abc import Iterable
 from functools import cache
 from importlib import resources
-from typing import Any
 
 from lxml import etree
 
-from ...model import Building
-from ..building_attributes import PREFIX
 from ..fragments import Fragment, Sheet
-from ..head import FileHead
 from . import version2
 from .version2 import CityGMLWriter
 
@@ -43,20 +36,8 @@ BUILDING_ELEMENTS = tuple(
 HUGE = etree.XMLParser(huge_tree=True, resolve_entities=False)
 
 
-def write_citygml3(
-    path: str | os.PathLike,
-    buildings: Iterable[Building],
-    crs: Any = None,
-    prefix: str = PREFIX,
-    creation_date: datetime.date | None = None,
-) -> None:
-    """Write `buildings` to `path` as CityGML 3.0; all else as `write_citygml`."""
-    head = FileHead(crs, prefix=prefix, creation_date=creation_date)
-    CityGML3Writer(path, head).add_all(buildings)
-
-
 class CityGML3Writer(CityGMLWriter):
-    """Incremental form of `write_citygml3`."""
+    """Incremental writer of CityGML 3.0; all else is as in `CityGMLWriter`."""
 
     namespaces, root_id = NAMESPACES_3, ' gml:id="city"'
 
