@@ -82,11 +82,9 @@ class Findings:
         return not any(self.counts[kind] for kind in MUST_BE_NONE)
 
 
-INTERNAL, INVALID, INVALID_WRITTEN = (
-    "internal error",
-    "invalid solid",
-    "invalid solid in a written file",
-)
+INTERNAL = "internal error"
+INVALID = "invalid solid"
+INVALID_WRITTEN = "invalid solid in a written file"
 NOT_ALIKE, ENDED = "not rebuilt alike", "run that ended"
 CHECKED = "solids in files"
 MUST_BE_NONE = (INTERNAL, INVALID, INVALID_WRITTEN, NOT_ALIKE, ENDED)

@@ -140,10 +140,8 @@ def compare_surfaces(case: Case, building: Building) -> tuple[float, int]:
         indexing="ij",
     )
     xy = np.column_stack([x.ravel(), y.ravel()])
-    z_true, z_model = (
-        compute_heights(list_polygons(true, (ROOF,)), xy),
-        compute_heights(list_polygons(model, (ROOF,)), xy),
-    )
+    z_true = compute_heights(list_polygons(true, (ROOF,)), xy)
+    z_model = compute_heights(list_polygons(model, (ROOF,)), xy)
     may_end = np.isnan(z_model) & ~shapely.contains_xy(seen_area, xy[:, 0], xy[:, 1])
     z_true[may_end | ~shapely.contains_xy(area, xy[:, 0], xy[:, 1])] = np.nan
     gaps = [

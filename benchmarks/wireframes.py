@@ -73,10 +73,8 @@ class Score:
 
 def compute_f1(right: int, n_drawn: int, true: int, n_found: int | None = None) -> float:
     """Return F1 (%) of `right` among drawn ones, and of found among true ones."""
-    precision, recall = (
-        right / max(n_drawn, 1),
-        (right if n_found is None else n_found) / max(true, 1),
-    )
+    precision = right / max(n_drawn, 1)
+    recall = (right if n_found is None else n_found) / max(true, 1)
     return 200.0 * precision * recall / (precision + recall) if precision + recall else 0.0
 
 

@@ -332,10 +332,8 @@ def columns_run(folder, key, values, town):
     """
     cloud = write_cloud(folder / "cloud.laz", town.xyz, town.classification)
     outlines = shapely.to_wkb(np.array(list(town.footprints.values()), object))
-    columns, path = (
-        [np.array(list(town.footprints), object), np.array(values)],
-        folder / "footprints.gpkg",
-    )
+    columns = [np.array(list(town.footprints), object), np.array(values)]
+    path = folder / "footprints.gpkg"
     pyogrio.raw.write(
         path, outlines, columns, ["id", "known"], geometry_type="Polygon", crs="EPSG:28992"
     )

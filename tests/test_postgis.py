@@ -42,10 +42,8 @@ def database():
 @pytest.fixture(scope="module")
 def table(database):
     """Three rows: a square, two squares with one name, and one without geometry."""
-    square, pair = (
-        shapely.box(0, 0, 10, 10),
-        shapely.MultiPolygon([shapely.box(20, 0, 30, 10), shapely.box(40, 0, 50, 10)]),
-    )
+    square = shapely.box(0, 0, 10, 10)
+    pair = shapely.MultiPolygon([shapely.box(20, 0, 30, 10), shapely.box(40, 0, 50, 10)])
     with psycopg.connect(database) as connection:
         connection.execute(
             "create table houses (id text, storeys int, geom geometry(Geometry, 28992), extra "

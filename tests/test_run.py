@@ -341,10 +341,8 @@ def test_the_output_carries_the_reference_system_that_any_input_names(
 ):
     town = make_town(houses=1)
     cloud = write_cloud(tmp_path / "cloud.laz", town.xyz, town.classification, of_cloud)
-    ids, geometry = (
-        np.array(["house-0"], object),
-        shapely.to_wkb(np.array(list(town.footprints.values()), object)),
-    )
+    ids = np.array(["house-0"], object)
+    geometry = shapely.to_wkb(np.array(list(town.footprints.values()), object))
     path = tmp_path / "footprints.gpkg"
     pyogrio.raw.write(path, geometry, [ids], ["id"], geometry_type="Polygon", crs=of_footprints)
     with warnings.catch_warnings():

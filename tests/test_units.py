@@ -247,11 +247,9 @@ def test_an_index_in_feet_is_asked_in_feet(tmp_path, monkeypatch):
     monkeypatch.setattr("hiproof.city.work.sort.QUERY_M", 25.0)
     monkeypatch.setattr("hiproof.read.points.runs.RUN_POINTS", 50)
     along = np.argsort(TOWN.xyz[:, 0].round(-1), kind="stable")
-    xyz, classes, origin = (
-        FEET.from_metres(TOWN.xyz[along]),
-        TOWN.classification[along],
-        FEET.from_metres(ORIGIN),
-    )
+    xyz = FEET.from_metres(TOWN.xyz[along])
+    classes = TOWN.classification[along]
+    origin = FEET.from_metres(ORIGIN)
     single = {"house-0": shapely.transform(TOWN.footprints["house-0"], FEET.from_metres)}
     footprints = str(write_footprints(tmp_path / "alone.gpkg", single, "EPSG:2263"))
     clouds = [

@@ -71,10 +71,8 @@ def compute_heights(volumes, U, V):
     z, top = np.full(U.shape[1], -np.inf), np.zeros(U.shape[1], int)
     for k, row in enumerate(volumes):
         u, v = U[int(row[DIRECTION])], V[int(row[DIRECTION])]
-        offset, slope = (
-            row[OFFSET0 : OFFSET0 + N_PLANES, None],
-            row[SLOPE0 : SLOPE0 + N_SIDES, None],
-        )
+        offset = row[OFFSET0 : OFFSET0 + N_PLANES, None]
+        slope = row[SLOPE0 : SLOPE0 + N_SIDES, None]
         rise = np.array([u, -u, v, -v]) + row[LEAN0 : LEAN0 + N_SIDES, None] * [v, v, u, u]
         h = np.min(
             [*(offset[:LEVEL] + slope * rise), np.broadcast_to(offset[LEVEL], u.shape)], axis=0

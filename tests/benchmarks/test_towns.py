@@ -129,11 +129,9 @@ def flat_roof(building) -> Roof:
 
 
 def test_solids_whose_grounds_lie_apart_are_buildings_of_their_own():
-    first, neighbour, distant = (
-        box(),
-        box().move(np.array([4.0, 0.0, 0.0])),
-        box(2.0, 2.0).move(np.array([20.0, 0.0, 0.0])),
-    )
+    first = box()
+    neighbour = box().move(np.array([4.0, 0.0, 0.0]))
+    distant = box(2.0, 2.0).move(np.array([20.0, 0.0, 0.0]))
     result = group_touching("house", {"a": first, "b": neighbour, "c": distant})
     assert [building.id for building in result] == ["house", "house~2"]
     assert [sorted(building.solids) for building in result] == [["a", "b"], ["c"]]

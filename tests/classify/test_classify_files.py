@@ -46,10 +46,8 @@ def test_a_copy_differs_in_its_classes_alone(tmp_path):
 
 
 def test_points_that_are_neither_keep_their_class_unless_it_was_one_of_the_two():
-    old, result = (
-        np.array([1, 5, 2, 6, 5, 0, 6], np.uint8),
-        np.array([1, 1, 1, 1, 6, 2, 6], np.uint8),
-    )
+    old = np.array([1, 5, 2, 6, 5, 0, 6], np.uint8)
+    result = np.array([1, 1, 1, 1, 6, 2, 6], np.uint8)
     assert merge_classes(old, result).tolist() == [1, 5, 1, 1, 6, 2, 6]
 
 

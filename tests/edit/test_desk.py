@@ -226,10 +226,8 @@ def test_an_edit_that_cannot_be_is_one_sentence(desk, change, message):
 def test_two_windows_lose_nothing(folder):
     first_desk, other = Desk(folder, "anna"), Desk(folder, "ben")
     buildings = first_desk.building(ID), other.building(ID)
-    flat, gable = (
-        buildings[0]["parts"],
-        edit(other, buildings[1]["parts"], action="change", part=0, change={"type": "gable"}),
-    )
+    flat = buildings[0]["parts"]
+    gable = edit(other, buildings[1]["parts"], action="change", part=0, change={"type": "gable"})
     accepted = first_desk.accept(ID, {"parts": flat, "version": buildings[0]["version"]})
     with pytest.raises(OtherVersion, match="anna accepted") as caught:
         other.accept(ID, {"parts": gable["parts"], "version": buildings[1]["version"]})

@@ -117,10 +117,8 @@ def test_a_high_horizon_leaves_the_light_of_the_sky_above_it(tmp_path):
 
 def test_a_hill_in_the_south_shades(tmp_path):
     town = open_street(tmp_path / "run", [place_house("a", 0, 0)])
-    free, shaded = (
-        describe_roof(town),
-        describe_roof(town, shading_terrain=write_hill(tmp_path / "h.tif")),
-    )
+    free = describe_roof(town)
+    shaded = describe_roof(town, shading_terrain=write_hill(tmp_path / "h.tif"))
     assert shaded[0] < 0.99 * free[0] and free[1] == 0.0 and 0.005 < shaded[1] < 0.1
 
 

@@ -85,10 +85,8 @@ def test_storeys_are_an_interval(tmp_path):
 
 
 def test_floor_areas_of_a_block_and_of_an_attic(tmp_path):
-    block, gable = (
-        place_house("block", 0, 0, eave=6.0),
-        place_house("gable", 20, 0, eave=5.0, rise=5.0),
-    )
+    block = place_house("block", 0, 0, eave=6.0)
+    gable = place_house("gable", 20, 0, eave=5.0, rise=5.0)
     answers = answer_street(tmp_path, [block, gable])
     floors = {
         id: (

@@ -102,11 +102,9 @@ def list_triangles(solid):
 
 def cast_rays(triangles, places, directions):
     """Return whether each place (n,) is free in each direction (t,), by all triangles (m, 3, 3)."""
-    corner, u, v = (
-        triangles[:, 0],
-        triangles[:, 1] - triangles[:, 0],
-        triangles[:, 2] - triangles[:, 0],
-    )
+    corner = triangles[:, 0]
+    u = triangles[:, 1] - triangles[:, 0]
+    v = triangles[:, 2] - triangles[:, 0]
     free = np.ones((len(places), len(directions)), bool)
     for t, direction in enumerate(directions):
         across = np.cross(direction, v)

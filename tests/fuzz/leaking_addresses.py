@@ -83,12 +83,10 @@ def draw_address(rng: random.Random) -> str:
 def call(*arguments: str) -> str:
     """What the command line says."""
     out = StringIO()
-    level, handlers, show, listener = (
-        LOGGER.level,
-        LOGGER.handlers[:],
-        warnings.showwarning,
-        news.listener,
-    )
+    level = LOGGER.level
+    handlers = LOGGER.handlers[:]
+    show = warnings.showwarning
+    listener = news.listener
     try:
         patched_arguments = patch.object(sys, "argv", ["hiproof", *arguments])
         with patched_arguments, redirect_stdout(out), redirect_stderr(out), suppress(SystemExit):

@@ -53,11 +53,9 @@ def box_city(count, code="1000"):
 
 def test_simulated_clouds_are_the_same_whenever_asked_for_and_differ_by_role():
     source = open_source("simulated")
-    first, repeat, other = (
-        source.sample(TRAINING, 5),
-        source.sample(TRAINING, 5),
-        source.sample(VALIDATION, 5),
-    )
+    first = source.sample(TRAINING, 5)
+    repeat = source.sample(TRAINING, 5)
+    other = source.sample(VALIDATION, 5)
     np.testing.assert_array_equal(first.xyz, repeat.xyz)
     assert first.xyz.shape != other.xyz.shape or not np.array_equal(first.xyz, other.xyz)
 

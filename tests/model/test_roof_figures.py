@@ -29,10 +29,8 @@ def two_levels():
     """A quarter of the roof at 3 m, three quarters at 6 m (only the faces that the figures of a
     roof need).
     """
-    lower, upper = (
-        prism([[(0, 0), (1, 0), (1, 4), (0, 4)]], 0, 3),
-        prism([[(1, 0), (4, 0), (4, 4), (1, 4)]], 0, 6),
-    )
+    lower = prism([[(0, 0), (1, 0), (1, 4), (0, 4)]], 0, 3)
+    upper = prism([[(1, 0), (4, 0), (4, 4), (1, 4)]], 0, 6)
     shifted = [Face(tuple(tuple(i + 8 for i in r) for r in f.rings), f.kind) for f in upper.faces]
     return Solid(np.vstack([lower.vertices, upper.vertices]), lower.faces + tuple(shifted))
 
@@ -74,10 +72,8 @@ def test_a_valley_is_no_ridge():
 
 @pytest.mark.parametrize("width", [0.1, 1 / 3, 7.7])
 def test_half_the_roof_at_a_level_is_enough_for_it(width):
-    lower, upper = (
-        prism([[(0, 0), (width, 0), (width, 4), (0, 4)]], 0, 3),
-        prism([[(0, 0), (width, 0), (width, 4), (0, 4)]], 0, 6),
-    )
+    lower = prism([[(0, 0), (width, 0), (width, 4), (0, 4)]], 0, 3)
+    upper = prism([[(0, 0), (width, 0), (width, 4), (0, 4)]], 0, 6)
     faces = lower.select_faces(ROOF) + tuple(
         Face(tuple(tuple(i + 8 for i in r) for r in f.rings), ROOF)
         for f in upper.select_faces(ROOF)
@@ -135,10 +131,8 @@ def test_many_levels_are_searched_exactly():
 
 @pytest.mark.parametrize("shift", [(0, 0, 0), (1e7, -1e7, 0), (85000, 446000, -6)])
 def test_figures_move_with_the_solid(shift):
-    first, second = (
-        roof_figures(hip_house()),
-        roof_figures(hip_house().move(np.array(shift, float))),
-    )
+    first = roof_figures(hip_house())
+    second = roof_figures(hip_house().move(np.array(shift, float)))
     for name in ("h_min", "h_50p", "h_70p", "h_max", "h_ridge", "h_base"):
         assert getattr(second, name) - shift[2] == pytest.approx(getattr(first, name), abs=1e-6)
     for name in ("volume_m3", "plan_area_m2", "roof_area_m2", "slope_deg", "azimuth_deg"):

@@ -154,10 +154,8 @@ def test_what_shrinks_to_a_line_on_the_grid_is_no_area():
 @pytest.mark.parametrize("seed", range(20))
 def test_parts_in_one_plane_whose_outlines_miss_one_another_leave_no_slivers(seed):
     rng = np.random.default_rng(seed)
-    first, second = (
-        affinity.rotate(shapely.box(0, 0, 6, 5), 30),
-        affinity.rotate(shapely.box(6, 0, 10, 5), 30, (3, 2.5)),
-    )
+    first = affinity.rotate(shapely.box(0, 0, 6, 5), 30)
+    second = affinity.rotate(shapely.box(6, 0, 10, 5), 30, (3, 2.5))
     boxes = [
         shapely.set_precision(affinity.rotate(box, rng.uniform(-0.02, 0.02)), 1e-4)
         for box in (first, second)

@@ -209,10 +209,8 @@ def test_eaves_lie_where_the_parameters_say(shape):
                 continue
             middle = translation[:2] + (half * way) @ np.array([[c, s], [-s, c]])
             inwards = -np.array(way) @ np.array([[c, s], [-s, c]])
-            eave, pitch = (
-                parameters[f"eave_{name}"],
-                math.tan(math.radians(parameters[f"pitch_{name}"])),
-            )
+            eave = parameters[f"eave_{name}"]
+            pitch = math.tan(math.radians(parameters[f"pitch_{name}"]))
             eave_heights = np.abs(planes[:, :2] @ inwards - pitch) + np.abs(
                 planes @ (*middle, 1.0) - translation[2] - eave
             )
@@ -316,10 +314,8 @@ def test_several_members_are_measured_as_each_of_them(shape, regular):
     ]
     looks_alike = member.turn(2).has == member.has  # else it is seen from one side alone
     for kappa in [member.turn(quarters).kappa for quarters in (range(4) if looks_alike else (0,))]:
-        together, separate = (
-            stack_members(singles).measure_as(kind, kappa),
-            [members.measure_as(kind, kappa) for members in singles],
-        )
+        together = stack_members(singles).measure_as(kind, kappa)
+        separate = [members.measure_as(kind, kappa) for members in singles]
         assert all(list(one) == list(together) for one in separate)
         for name, values in together.items():
             each = [one[name] for one in separate]
@@ -333,10 +329,8 @@ def stack_members(members):
         for field in ("centre", "half", "eaves", "slopes", "leans")
     )
     centre, half, eaves, slopes, leans = arrays
-    tops, cants = (
-        np.array([matching.top for matching in members]),
-        np.stack([matching.cants for matching in members], axis=2),
-    )
+    tops = np.array([matching.top for matching in members])
+    cants = np.stack([matching.cants for matching in members], axis=2)
     return Member(members[0].kappa, centre, half, eaves, slopes, tops, leans, cants)
 
 

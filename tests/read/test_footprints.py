@@ -150,10 +150,8 @@ def test_a_list_stays_a_list_however_long(tmp_path):
     ring = [[0, 0], [9, 0], [9, 9], [0, 0]]
     feature = {"type": "Feature", "properties": {"many": list(range(2000)), "names": ["a", "b"]}}
     feature["geometry"] = {"type": "Polygon", "coordinates": [ring]}
-    path, crs = (
-        tmp_path / "a.geojson",
-        {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::28992"}},
-    )
+    path = tmp_path / "a.geojson"
+    crs = {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::28992"}}
     path.write_text(json.dumps({"type": "FeatureCollection", "crs": crs, "features": [feature]}))
     assert read_footprints(path)[0].attributes == feature["properties"]
 

@@ -35,10 +35,8 @@ def write(
     """
     transform = transform or from_origin(WEST, NORTH, 1, 1)
     rows, columns = np.mgrid[:SIDE, :SIDE] + 0.5
-    x, y = (
-        transform.a * columns + transform.b * rows + transform.c,
-        transform.d * columns + transform.e * rows + transform.f,
-    )
+    x = transform.a * columns + transform.b * rows + transform.c
+    y = transform.d * columns + transform.e * rows + transform.f
     values = (
         height(np.column_stack([x.ravel(), y.ravel()])).reshape(SIDE, SIDE)
         if heights is None

@@ -168,11 +168,9 @@ def test_one_refused_layer_among_others_is_listed(tmp_path):
 
 
 def test_polygons_of_one_feature_that_overlap_are_one_and_those_beside_each_other_several():
-    house, annex, other = (
-        shapely.box(0, 0, 10, 10),
-        shapely.box(8, 0, 14, 6),
-        shapely.box(10, 0, 15, 10),
-    )
+    house = shapely.box(0, 0, 10, 10)
+    annex = shapely.box(8, 0, 14, 6)
+    other = shapely.box(10, 0, 15, 10)
     (whole,) = simple_polygons(shapely.MultiPolygon([house, annex]))
     assert whole.area == pytest.approx(124.0)
     assert [polygon.area for polygon in simple_polygons(shapely.MultiPolygon([house, other]))] == [

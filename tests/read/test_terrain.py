@@ -149,11 +149,9 @@ class Around:
 def test_a_chain_asks_the_next_where_one_does_not_know(tmp_path):
     model = read_terrain(write_raster(tmp_path / "dtm.tif", width=20, height=20))
     chain = TerrainChain([model, None, Around()])
-    first_place, second_place, nowhere = (
-        [WEST + 5, NORTH - 5],
-        [WEST + 40, NORTH - 20],
-        [WEST + 900, NORTH],
-    )
+    first_place = [WEST + 5, NORTH - 5]
+    second_place = [WEST + 40, NORTH - 20]
+    nowhere = [WEST + 900, NORTH]
     heights, sources = chain.heights_and_sources(np.array([first_place, second_place, nowhere]))
     assert heights[0] == pytest.approx(plane(np.array([first_place]))[0])
     assert heights[1] == pytest.approx(plane(np.array([second_place]))[0] + 1, abs=0.1)

@@ -59,10 +59,8 @@ def test_a_type_the_fit_gave_up_is_behind_the_best_but_its_evidence_says_little(
         next(iter(combine({"flat": 0.99, "gable": 0.005, "hip": 0.005}, bics, points=200)))
         == "flat"
     )
-    many_points, few_points = (
-        combine(even, bics, points=2000)["flat"],
-        combine(even, bics, points=20)["flat"],
-    )
+    many_points = combine(even, bics, points=2000)["flat"]
+    few_points = combine(even, bics, points=20)["flat"]
     assert many_points < few_points
 
 

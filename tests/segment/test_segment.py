@@ -51,10 +51,8 @@ def test_simulated_roofs_are_recognised_and_freed_of_what_is_no_roof():
         result = segment(points)
         right += result.type == type
         is_rejected, true = ~result.is_roof, labels == NOT_ROOF
-        intersection, union = (
-            intersection + (is_rejected & true).sum(),
-            union + (is_rejected | true).sum(),
-        )
+        intersection = intersection + (is_rejected & true).sum()
+        union = union + (is_rejected | true).sum()
     assert right >= 54
     assert intersection / union > 0.8
 

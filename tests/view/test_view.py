@@ -240,10 +240,8 @@ def test_roofs_have_the_colours_of_an_update_where_one_is_told(serving, tmp_path
 def test_tiles_that_cannot_be_read_are_said(tiles, serving, tmp_path):
     shutil.copytree(tiles, tmp_path / "broken")
     (tmp_path / "broken/tiles/r.glb").unlink()
-    page, folder = (
-        render_page("run").replace("</body>", UNTIL_SETTLED + "</body>"),
-        tmp_path / "broken",
-    )
+    page = render_page("run").replace("</body>", UNTIL_SETTLED + "</body>")
+    folder = tmp_path / "broken"
     text = render_document(page, folder, serving, tmp_path / "first")
     assert "Some tiles cannot be read (tiles/r.glb: 404)" in text
     (folder / "tileset.json").unlink()

@@ -32,11 +32,9 @@ from hiproof.write.naming import FileUnits
 from hiproof.write.reprojected import choose_file_crs
 from tiny_town import make_town, write_cloud, write_footprints
 
-DELFT, NEW_YORK, PARIS = (
-    (85000.0, 446000.0, 2.0),
-    (300000.0, 60000.0, 12.0),
-    (652000.0, 6862000.0, 35.0),
-)
+DELFT = (85000.0, 446000.0, 2.0)
+NEW_YORK = (300000.0, 60000.0, 12.0)
+PARIS = (652000.0, 6862000.0, 35.0)
 WAYS = {
     "national grid to UTM": ("EPSG:7415", "EPSG:25831", DELFT),
     "to the next UTM zone": ("EPSG:7415", "EPSG:25832", DELFT),

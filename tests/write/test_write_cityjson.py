@@ -54,10 +54,8 @@ def validator(name):
 )
 @pytest.mark.parametrize("crs", ["EPSG:7415", None])
 def test_valid_by_the_schema(tmp_path, buildings, crs):
-    whole, feature = (
-        validator("cityjson.min.schema.json"),
-        validator("cityjsonfeature.min.schema.json"),
-    )
+    whole = validator("cityjson.min.schema.json")
+    feature = validator("cityjsonfeature.min.schema.json")
     head, *features = sequence(tmp_path, buildings, crs)
     assert len(features) == len(buildings)
     assert [error.message for item in features for error in feature.iter_errors(item)] == []

@@ -168,12 +168,10 @@ def wall_rises(follow: list[int], level: list[int]) -> dict[int, tuple[int, int,
     """Return half-edges whose left cell is higher, with low, high at the origin and the end."""
     rises = {}
     for h in range(len(follow)):
-        low_u, high_u, low_v, high_v = (
-            level[follow[h ^ 1]],
-            level[h],
-            level[h ^ 1],
-            level[follow[h]],
-        )
+        low_u = level[follow[h ^ 1]]
+        high_u = level[h]
+        low_v = level[h ^ 1]
+        high_v = level[follow[h]]
         if high_u > low_u or high_v > low_v:
             rises[h] = (low_u, high_u, low_v, high_v)
     return rises

@@ -22,12 +22,10 @@ from ..write.colours import page_colours
 from .desk import Desk, render_drawing
 from .edits import OtherVersion
 
-JSON, SCRIPT, STYLE, SVG = (
-    "application/json",
-    "text/javascript; charset=utf-8",
-    "text/css; charset=utf-8",
-    "image/svg+xml",
-)
+JSON = "application/json"
+SCRIPT = "text/javascript; charset=utf-8"
+STYLE = "text/css; charset=utf-8"
+SVG = "image/svg+xml"
 EDIT_ASSETS = {
     "": ("hiproof.edit", "assets/edit.html", HTML),
     "page.css": ("hiproof.evaluate", "assets/page.css", STYLE),

@@ -55,11 +55,9 @@ AXIS = np.array([0, 0, 1, 1])
 SIGN = np.array([1.0, -1.0, 1.0, -1.0])
 # which side becomes left, right, front, back when the axes turn by 90, 180, 270 degrees, and the
 # sign that their leans take then
-QUARTER_TURN, HALF_TURN, OTHER_TURN = (
-    [FRONT, BACK, RIGHT, LEFT],
-    [RIGHT, LEFT, BACK, FRONT],
-    [BACK, FRONT, LEFT, RIGHT],
-)
+QUARTER_TURN = [FRONT, BACK, RIGHT, LEFT]
+HALF_TURN = [RIGHT, LEFT, BACK, FRONT]
+OTHER_TURN = [BACK, FRONT, LEFT, RIGHT]
 LEANS_TURN = np.array([-1.0, -1.0, 1.0, 1.0])
 TURNS = {1: (QUARTER_TURN, LEANS_TURN), 2: (HALF_TURN, -np.ones(4)), 3: (OTHER_TURN, -LEANS_TURN)}
 SAME = 1e-9  # m; numerically equal
@@ -184,12 +182,10 @@ class Member:
         side = 2 * axis
         if not (self.has[side] and self.has[side + 1]):
             return math.inf
-        lower, upper, item, other = (
-            self.eaves[side],
-            self.eaves[side + 1],
-            self.slopes[side],
-            self.slopes[side + 1],
-        )
+        lower = self.eaves[side]
+        upper = self.eaves[side + 1]
+        item = self.slopes[side]
+        other = self.slopes[side + 1]
         # from the low side's eave to the ridge
         run = (upper - lower + 2.0 * self.half[axis] * other) / (item + other)
         return lower + item * run
@@ -201,11 +197,9 @@ class Member:
         kappa = math.remainder(self.kappa + 0.5 * math.pi * quarters, 2.0 * math.pi)
         sides, leans_turn = TURNS[quarters]
         half = self.half[::-1].copy() if quarters % 2 else self.half
-        eaves, slopes, leans = (
-            self.eaves[sides],
-            self.slopes[sides],
-            (self.leans[sides].T * leans_turn).T,
-        )
+        eaves = self.eaves[sides]
+        slopes = self.slopes[sides]
+        leans = (self.leans[sides].T * leans_turn).T
         return Member(
             kappa,
             self.centre,
@@ -225,11 +219,9 @@ class Member:
     def quarter_turns(self) -> int:
         """How many turns lead to the canonical direction."""
         _, sides = self.general_shape
-        targets, names, places = (
-            [side in sides for side in range(4)],
-            [],
-            [LEFT, RIGHT, FRONT, BACK],
-        )
+        targets = [side in sides for side in range(4)]
+        names = []
+        places = [LEFT, RIGHT, FRONT, BACK]
         lies = self.lies_along(0), self.lies_along(1)
         for turns in range(4):
             if lies[turns % 2] and [self.has[place] for place in places] == targets:
@@ -275,19 +267,15 @@ class Member:
             return name
         member = self.canonical()
         if name == "gable":
-            return (
-                "gable"
-                if abs(member.slopes[FRONT] - member.slopes[BACK]) < SAME
-                else "asymmetric_gable"
-            )
-        if name in ("hip", "side_hip"):
-            ends = [side for side in (LEFT, RIGHT) if member.has[side]]
-            sides = member.eaves[2:].max()
-            drop = min(member.eaves[side] for side in ends) - sides
-            if drop > HALF_HIP_SHARE * (member.apex(1) - sides):
-                return name.replace("hip", "half_hip")
-            if name == "hip" and abs(member.apex(0) - member.apex(1)) < SAME:
-                return "pyramid"
+            is_even = abs(member.slopes[FRONT] - member.slopes[BACK]) < SAME
+            return "gable" if is_even else "asymmetric_gable"
+        ends = [side for side in (LEFT, RIGHT) if member.has[side]]
+        sides = member.eaves[2:].max()
+        drop = min(member.eaves[side] for side in ends) - sides
+        if drop > HALF_HIP_SHARE * (member.apex(1) - sides):
+            return name.replace("hip", "half_hip")
+        if name == "hip" and abs(member.apex(0) - member.apex(1)) < SAME:
+            return "pyramid"
         return name
 
     @cached_property

@@ -51,13 +51,11 @@ POSTGRES_TYPES: dict[type, str] = {
 KIND_OF_TYPE = {name: kind for kind, name in POSTGRES_TYPES.items()}
 OWN_COLUMNS = ("run", "geom")
 # Codes of well-known binary: ISO's of surfaces in space, those in plan, and PostGIS's flag
-WKB_POLYHEDRAL_Z, WKB_POLYGON_Z, WKB_POLYGON, WKB_MULTIPOLYGON, WKB_HAS_SRID = (
-    1015,
-    1003,
-    3,
-    6,
-    0x20000000,
-)
+WKB_POLYHEDRAL_Z = 1015
+WKB_POLYGON_Z = 1003
+WKB_POLYGON = 3
+WKB_MULTIPOLYGON = 6
+WKB_HAS_SRID = 0x20000000
 
 
 class PostgisTable(NamedTuple):
