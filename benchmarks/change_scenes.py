@@ -135,17 +135,6 @@ def scan_houses(
     return Scan(np.column_stack([xy, z]) + noise, np.zeros(len(xy), int), source)
 
 
-def write_outlines(path: Path, houses: list[House]) -> None:
-    """Write the outlines of houses before the change."""
-    outlines = [
-        shapely.transform(house.building.roof.outline, lambda xy, p=house.place: xy + p)
-        for house in houses
-    ]
-    ids = np.array([house.id for house in houses], object)
-    wkb = shapely.to_wkb(np.array(outlines, object))
-    pyogrio.raw.write(path, wkb, [ids], ["id"], geometry_type="Polygon", crs="EPSG:28992")
-
-
 def reconstruct_city(folder: Path) -> None:
     """Reconstruct the first survey of a city from the beginning."""
     footprints = str(folder / "footprints.gpkg")
@@ -178,7 +167,15 @@ def run_scene(scene: ChangeScene, folder: Path, seed: int, is_verbose: bool) -> 
     """Run and update a scene; return counts of changes, hits, right kinds and alarms."""
     folder.mkdir(parents=True, exist_ok=True)
     houses, rng = draw_houses(scene, seed), np.random.default_rng(seed + 1)
-    write_outlines(folder / "footprints.gpkg", houses)
+    outlines = [
+        shapely.transform(house.building.roof.outline, lambda xy, p=house.place: xy + p)
+        for house in houses
+    ]
+    ids = np.array([house.id for house in houses], object)
+    wkb = shapely.to_wkb(np.array(outlines, object))
+    pyogrio.raw.write(
+        folder / "footprints.gpkg", wkb, [ids], ["id"], geometry_type="Polygon", crs="EPSG:28992"
+    )
     for name, density in zip(("first", "second"), scene.densities, strict=True):
         cloud = scan_houses(houses, density, rng, name == "second")
         cloud = cloud.move(np.array(scene.shift_m)) if name == "second" else cloud

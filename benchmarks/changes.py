@@ -38,7 +38,7 @@ from pathlib import Path
 import numpy as np
 import shapely
 
-from hiproof.model import Building, Roof
+from hiproof.model import Building
 from hiproof.parametric.building import build
 from hiproof.parametric.file import read_parameters
 from hiproof.read.points.pointcloud import read_points
@@ -210,23 +210,18 @@ def run_city(
     middle = time.process_time()
     summary = update_city(folder)
     end = time.process_time()
+    stock = Stock(City(count, seed, densities[0]))
+    lots = stock.near((*stock.low.min(axis=0), *stock.high.max(axis=0)))
+    after, by_id = draw_truth(seed, lots, share)[1], {lot.id: lot for lot in lots}
     return {
         "truth": truth,
         "rows": read_changes(folder),
         "seconds": (middle - start, end - middle),
         "shift": summary.surveys.shift,
-        "kept": count_kept(folder, find_changed_roofs(seed, count, densities[0], share)),
+        "kept": count_kept(
+            folder, {id: (by_id[id].building.roof, lot.building.roof) for id, lot in after.items()}
+        ),
     }
-
-
-def find_changed_roofs(
-    seed: int, count: int, density: float, share: float
-) -> dict[str, tuple[Roof, Roof]]:
-    """Return the true roofs of changed buildings before and after, by id."""
-    stock = Stock(City(count, seed, density))
-    lots = stock.near((*stock.low.min(axis=0), *stock.high.max(axis=0)))
-    after, by_id = draw_truth(seed, lots, share)[1], {lot.id: lot for lot in lots}
-    return {id: (by_id[id].building.roof, lot.building.roof) for id, lot in after.items()}
 
 
 def measure_cost(

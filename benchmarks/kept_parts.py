@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import shapely
 
-from hiproof.model import Building, Roof
+from hiproof.model import Roof
 from hiproof.parametric.building import build
 from hiproof.parametric.file import read_parameters
 from hiproof.parametric.record import polygon
@@ -65,7 +65,7 @@ def count_parts(old: dict[str, Any], new: dict[str, Any], truth: tuple[Roof, Roo
         counts[f"{kind} parts"] += 1
         counts[f"{kind} continued"] += number in lineage
         counts[f"{kind} kept"] += any(is_equal(part, other, names) for other in new["parts"])
-    a, b = (measure_world(model, xy) for model in models)
+    a, b = (np.nan_to_num(measure_heights(model.roof, xy)) for model in models)
     counts["unchanged places"] += int(is_same.sum())
     counts["differ"] += int((is_same & (np.abs(b - a) > OTHER_M)).sum())
     for place in new["change"]["places"]:
@@ -85,11 +85,6 @@ def is_equal(part: dict[str, Any], other: dict[str, Any], names: tuple[str, ...]
 def measure_heights(roof: Roof, xy: np.ndarray) -> np.ndarray:
     """Return the height (n,) of a roof at places (n, 2) in the world."""
     return roof.height_at(xy - roof.frame.origin[:2]) + roof.frame.origin[2]
-
-
-def measure_world(model: Building, xy: np.ndarray) -> np.ndarray:
-    """Return the height (n,) of a model at places (n, 2) in the world, 0 beside it."""
-    return np.nan_to_num(measure_heights(model.roof, xy))
 
 
 def describe_kept(counts: Counter[str]) -> dict[str, float]:

@@ -81,22 +81,6 @@ def scan_house(
     return cloud.move(house.roof.frame.origin).points
 
 
-def judge_house(tally: OverhangTally, seed: int, density: float, is_compound: bool) -> None:
-    """Add a house with overhangs, and the same without, to the tally."""
-    rng = np.random.default_rng(seed)
-    house, widths = draw_house(rng, is_compound)
-    for truth in (widths, np.zeros(len(widths))):
-        roof = widen_roof(house.roof, truth) if truth.any() else house.roof
-        points = scan_house(rng, house, roof, density)
-        building = hiproof.reconstruct(points, house.footprint, None, WITH)
-        if building.built is None or building.model.eaves is None:
-            continue
-        tally.houses += 1
-        tally.left_out += "overhangs were left out" in building.detail
-        tally.invalid += not is_valid(building)
-        judge_lengths(tally, building, house, truth)
-
-
 def judge_lengths(
     tally: OverhangTally, building: Building, house: SimBuilding, truth: np.ndarray
 ) -> None:
@@ -155,7 +139,18 @@ def main() -> None:
         for density in a.densities:
             tally, start = OverhangTally(), time.perf_counter()
             for k in range(a.count):
-                judge_house(tally, a.first_seed + k, density, a.compounds)
+                rng = np.random.default_rng(a.first_seed + k)
+                house, widths = draw_house(rng, a.compounds)
+                for truth in (widths, np.zeros(len(widths))):
+                    roof = widen_roof(house.roof, truth) if truth.any() else house.roof
+                    points = scan_house(rng, house, roof, density)
+                    building = hiproof.reconstruct(points, house.footprint, None, WITH)
+                    if building.built is None or building.model.eaves is None:
+                        continue
+                    tally.houses += 1
+                    tally.left_out += "overhangs were left out" in building.detail
+                    tally.invalid += not is_valid(building)
+                    judge_lengths(tally, building, house, truth)
             errors = np.array(tally.errors)
             table.add(
                 density,

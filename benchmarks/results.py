@@ -62,7 +62,10 @@ def describe_tables(
     """Yield the lines of tables with the same columns, each row beside what it was measured by."""
     columns = tables[0]["columns"]
     runs = [
-        " ".join([f"`{t['arguments']}`"] * bool(t["arguments"]) + [t["date"]] * is_older(t, newest))
+        " ".join(
+            [f"`{t['arguments']}`"] * bool(t["arguments"])
+            + [t["date"]] * (t["date"] != newest["date"])
+        )
         for t in tables
     ]
     has_runs = len(tables) > 1
@@ -86,10 +89,6 @@ def show_columns(table: dict[str, Any], names: list[str] | None) -> dict[str, An
 
 def fill(text: str) -> str:
     return textwrap.fill(text, 100, break_on_hyphens=False)
-
-
-def is_older(table: dict[str, Any], newest: dict[str, Any]) -> bool:
-    return table["date"] != newest["date"]
 
 
 def describe_benchmark(name: str, figures: dict[str, Any], newest: dict[str, Any]) -> str:

@@ -229,7 +229,7 @@ def main() -> None:
     parser = make_parser(
         __doc__, parity="odd", most=40, densities=[1.0, 2.0, 5.0, 15.0], processes=1
     )
-    sources = ["compounds", *list_sources()]
+    sources = ["compounds", *(name for name, path in PLACES.items() if path.is_file())]
     parser.add_argument("--sources", nargs="+", default=sources, choices=sources)
     parser.add_argument("--with-footprints", action="store_true", help="alone")
     parser.add_argument("--without-footprints", action="store_true", help="alone")
@@ -266,11 +266,6 @@ def main() -> None:
         reference = "with" if o.block.with_footprints else "without"
         case = f"{o.block.source} {o.id} {o.block.density:g}/m2 {reference} footprint, {o.defect}"
         print(f"{case}: RMSE {o.rmse:.2f} m, wrong levels {o.wrong_levels}")
-
-
-def list_sources() -> list[str]:
-    """List the towns whose buildings are scanned, where their truth exists."""
-    return [name for name, path in PLACES.items() if path.is_file()]
 
 
 if __name__ == "__main__":

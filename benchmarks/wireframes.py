@@ -133,17 +133,12 @@ def make_size_rows(scores: list[Score]) -> list[str]:
     return rows
 
 
-def compute_shares(counts: WireframeCounts) -> tuple[float, float]:
-    """Return precision and recall of the edges."""
-    right = counts.right_edges
-    return right / max(counts.edges, 1), right / max(counts.true_edges, 1)
-
-
 def make_cells(scores: list[Score]) -> list[str]:
     """Return the cells of COLUMNS: pairs are the pooled figure and the mean over buildings."""
     total = sum_counts(score.counts for score in scores)
     edges = np.mean([score.counts.edge_f1 for score in scores])
-    precision, recall = compute_shares(total)
+    right = total.right_edges
+    precision, recall = right / max(total.edges, 1), right / max(total.true_edges, 1)
     areas, ms = np.array([s.area_m2 for s in scores]), 1e3 * np.array([s.seconds for s in scores])
     faces = f"{total.faces / total.true_faces:.2f}" if total.true_faces else "-"
     return [
