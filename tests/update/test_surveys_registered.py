@@ -82,11 +82,8 @@ def test_a_shift_aside_that_few_roofs_show_is_right_or_warned_of(seed, count, sh
     shift = np.array([*np.random.default_rng(seed).choice([-0.5, 0.5], 2), 0.05])
     samples = draw_samples(seed, draw_rises(seed, count, share), shift)
     found = register_surveys(samples, READ)
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        found.warn("survey of 2024-05-01")
     is_right = np.abs(found.clear_xyz - shift).max() < 0.15
-    assert is_right or any("--shift EAST,NORTH,UP" in str(w.message) for w in caught)
+    assert is_right or any("--shift EAST,NORTH,UP" in text for text in catch_warnings(samples))
 
 
 @pytest.mark.parametrize("kind", ["a slope", "a valley"])
@@ -213,3 +210,41 @@ def test_a_tilt_is_seen_and_counts_as_noise(seed, has_ground):
 def test_what_a_shift_rests_on_is_said():
     found = register_surveys(draw_samples(6, draw_rises(6, 10, 0.3)), READ)
     assert found.rests_on == "the ground at 10 places and 7 of 10 sampled roofs"
+
+
+def catch_warnings(samples):
+    """The texts with which a survey of these samples is warned of."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        register_surveys(samples, READ).warn("survey of 2024-05-01")
+    return [str(w.message) for w in caught]
+
+
+@pytest.mark.parametrize(("count", "share"), [(1, 1.0), (12, 1.0), (12, 0.5), (12, 0.1)])
+def test_points_of_the_earlier_survey_are_told(count, share):
+    """A survey given twice shows no change, and neither do old points among new ones."""
+    samples = draw_samples(8, [0.0] * count)
+    twice = round(share * count)
+    samples[:twice] = [s._replace(new=np.concatenate([s.old, s.new])) for s in samples[:twice]]
+    (text,) = catch_warnings(samples)
+    assert f"{twice} of {count} sampled roofs have the points of the earlier survey" in text
+
+
+@pytest.mark.parametrize("up", [-0.4, 0.3, 2.0])
+def test_a_strip_that_lies_elsewhere_with_its_ground_is_no_change_in_silence(up):
+    samples = draw_samples(9, [0.0] * 16, (0.1, 0.0, 0.05))
+    lifted = [
+        s._replace(new=s.new + [0, 0, up], ground=s.ground + [0, 0, up, 0, 0]) for s in samples[:4]
+    ]
+    (text,) = catch_warnings(lifted + samples[4:])
+    assert "4 of 16 sampled roofs lie elsewhere together with the ground around them" in text
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("share", [0.0, 0.3])
+def test_a_usual_survey_gets_no_warning(seed, share):
+    rng = np.random.default_rng(seed)
+    samples = draw_samples(seed, draw_rises(seed, 20, share), (*rng.normal(0, 0.2, 2), 0.1))
+    for k in range(16, 20):  # a terrace beside one house in five
+        samples[k] = samples[k]._replace(ground=samples[k].ground + [0, 0, 0.4, 0, 0])
+    assert catch_warnings(samples) == []

@@ -217,6 +217,8 @@ def make_members(
     ]
     used = {s.earlier for s in successors} | {i for s in successors for i in s.predecessors}
     others = [member for i, member in enumerate(kept) if i not in used]
+    if request.id_attribute:
+        warn_of_other_ids(kept, successors, footprints, request.footprints)
     names = {member.id for member in others} | {
         kept[s.earlier].id for s in successors if s.earlier >= 0
     }
@@ -228,6 +230,29 @@ def make_members(
         result.append(dataclasses.replace(member, ended=tuple(filter(None, ended))))
         names.add(member.id)
     return (*result, *others)
+
+
+def warn_of_other_ids(
+    kept: list[UpdateMember],
+    successors: list[Successor],
+    footprints: tuple[Footprint, ...],
+    path: str,
+) -> None:
+    """Warn of footprints whose ids are those of other earlier buildings than they lie on."""
+    known = {member.id for member in kept}
+    pairs = [
+        (footprint.id, kept[successor.earlier].id)
+        for successor, footprint in zip(successors, footprints, strict=True)
+        if successor.earlier >= 0 and footprint.id in known - {kept[successor.earlier].id}
+    ]
+    if pairs:
+        given, found = pairs[0]
+        warnings.warn(
+            f"{mask(path)}: {len(pairs)} of {len(footprints)} footprints lie on another building "
+            f"than the one with their id, the first, {given:.80}, on {found:.80}. Buildings keep "
+            "the ids of the run; check that the footprints are of the same place and CRS",
+            InputWarning,
+        )
 
 
 def leave_out_copies(footprints: tuple[Footprint, ...], path: str) -> tuple[Footprint, ...]:

@@ -24,6 +24,7 @@ import shapely
 from ..city.plan.registration import SAMPLE_CELL_M, hash_cell
 from ..city.plan.work_plan import WorkPlan
 from ..errors import InputWarning, SettingsError
+from ..geometry.thin import hashes
 from ..model import Roof
 from ..settings import ReadSettings
 from .cells import (
@@ -85,6 +86,10 @@ CHANGED_SHARE, MOST_STRAY = 0.3, 0.02
 """Share of the roofs that may have changed: those with the most stray cells do not count. Where
 more have, the share of stray cells is bounded: seven times that of usual roofs."""
 
+REPEATED_SHARE = 0.1
+"""Share of a roof's new points that are earlier ones, from which on these were given again: no two
+pulses have the same coordinates but by chance."""
+
 LEAST_M = 0.02
 """Least noise (m): coordinates come in centimetres."""
 
@@ -111,9 +116,10 @@ class SurveyShift:
     """How far (x, y, z in m) the new survey lies beside the earlier one.
 
     `sigma` has the standard deviations. `agreeing` of so many `roofs` lie where the shift puts
-    them, and the ground at so many `places` shows it, by `ground` (m). `tilt` (m) is how much
-    higher one end of the area lies than the other. With a `doubt`, a sentence, the shift is not
-    applied. `noise` is what is left between unchanged roofs.
+    them, and the ground at so many `places` shows it, by `ground` (m). `repeated` of the roofs have
+    the points of the earlier survey, `moved` lie elsewhere together with the ground around them.
+    `tilt` (m) is how much higher one end of the area lies than the other. With a `doubt`, a
+    sentence, the shift is not applied. `noise` is what is left between unchanged roofs.
     """
 
     xyz: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -122,6 +128,8 @@ class SurveyShift:
     agreeing: int = 0
     places: int = 0
     ground: float = 0.0
+    repeated: int = 0
+    moved: int = 0
     tilt: float = 0.0
     doubt: str = ""
     noise: SurveyNoise = field(default_factory=SurveyNoise)
@@ -172,6 +180,19 @@ class SurveyShift:
                 f"({self.rests_on}), because no ground around them lies in both surveys. It would "
                 "hide that all roofs were raised or lowered alike. If they were, pass --shift off, "
                 "and if the shift is known, --shift EAST,NORTH,UP",
+                InputWarning,
+            )
+        if self.repeated:
+            warnings.warn(
+                f"{name}: {self.repeated} of {self.roofs} sampled roofs have the points of the "
+                "earlier survey, which show no change; name the clouds of the new survey alone",
+                InputWarning,
+            )
+        if self.moved and not (self.doubt or self.tilt):
+            warnings.warn(
+                f"{name}: {self.moved} of {self.roofs} sampled roofs lie elsewhere together with "
+                "the ground around them: strips of a survey do not fit each other, or the ground "
+                "moved. Such roofs count as raised or lowered; check their ground first",
                 InputWarning,
             )
         x, y, _ = self.xyz
@@ -249,6 +270,9 @@ def register_surveys(samples: Iterable[SampledRoof], read: ReadSettings) -> Surv
     ground[:, 2] += ground[:, 3:] @ shift[:2]
     offsets = np.array([np.median(residuals - design @ shift) for design, residuals in rows])
     is_agreeing = np.abs(offsets) < SHIFT_SCALE_M
+    rises = [measure_level(sample.ground, shift) - shift[2] for sample, _ in pairs]
+    is_moved = (np.abs(rises) > SAME_HEIGHT_M) & (np.abs(offsets - rises) < SAME_HEIGHT_M)
+    is_moved &= [len(sample.ground) > 0 for sample, _ in pairs]
     result = SurveyShift(
         tuple(np.round(shift, 4).tolist()),
         tuple(np.round(sigma, 4).tolist()),
@@ -256,6 +280,8 @@ def register_surveys(samples: Iterable[SampledRoof], read: ReadSettings) -> Surv
         int(is_agreeing.sum()),
         len(ground),
         round(level, 4),
+        sum(repeats_points(sample) for sample, _ in pairs),
+        int(is_moved.sum()),
         measure_tilt(ground if len(ground) else place_roofs(pairs, offsets)[is_agreeing]),
     )
     areas = np.array([sample.roof.outline.area for sample, _ in pairs])
@@ -277,6 +303,14 @@ def measure_level(ground: np.ndarray, shift: np.ndarray) -> float:
     What slopes show of a `shift` aside is taken off.
     """
     return float(np.median(ground[:, 2] + ground[:, 3:] @ shift[:2])) if len(ground) else 0.0
+
+
+def repeats_points(sample: SampledRoof) -> bool:
+    """Return whether new points of a roof are its earlier ones."""
+    if sample.old is None or not len(sample.new):
+        return False
+    is_old = np.isin(hashes(sample.new), hashes(sample.old))
+    return bool(is_old.mean() > REPEATED_SHARE)
 
 
 def measure_ground(samples: list[SampledRoof]) -> np.ndarray:

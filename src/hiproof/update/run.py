@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import shutil
+import warnings
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +16,7 @@ from ..city.plan.checks import refuse_unusable
 from ..city.plan.from_cloud import Progress
 from ..city.plan.work_plan import WorkPlan
 from ..city.run import Steps, Summary, extend_run_record, reconstruct_in_folder
-from ..errors import InputError, OutputError, SettingsError
+from ..errors import InputError, InputWarning, OutputError, SettingsError
 from ..evaluate.run import list_run_inputs
 from ..formats import list_requested_files
 from ..garbage import collect_rarely
@@ -33,6 +34,9 @@ from .outside import CELLS_FOLDER, load_roofs_outside
 from .plan import make_update_plan
 from .request import EACH_BUILDING, WHOLE_CITY, UpdateRequest
 from .tile import sort_survey, update_tile
+
+MANY_CHANGED = 8
+"""Buildings that have to count as changed for a warning that most do."""
 
 
 @dataclass(frozen=True)
@@ -128,6 +132,14 @@ def report_changes(request: UpdateRequest, state: Path, summary: Summary) -> Upd
     found, files = write_changes(out)
     outside = load_roofs_outside(state)
     by_change = Counter(change.record["change"]["class"] for change in found)
+    n_changed = by_change[Change.CHANGED.code] + by_change[Change.GONE.code]
+    if n_changed >= MANY_CHANGED and 2 * n_changed > summary.buildings:
+        warnings.warn(
+            f"{n_changed} of {summary.buildings} buildings count as changed, more than a town has. "
+            "The survey may lie aside or be in another CRS or unit: look at some of them with "
+            "`hiproof report`, and pass its shift with --shift EAST,NORTH,UP",
+            InputWarning,
+        )
     by_change[Change.UNCHANGED.code] = summary.buildings - len(found)
     by_kind = Counter(
         change.record["change"]["places"][0]["kind"]

@@ -1,0 +1,77 @@
+"""Files that are not what an update takes them for: it never believes them in silence."""
+
+import shutil
+import warnings
+
+import numpy as np
+import pytest
+import shapely
+
+from hiproof.city.request import Request
+from hiproof.city.run import reconstruct_area
+from hiproof.update.request import UpdateRequest
+from hiproof.update.run import update_area
+from tiny_town import make_town, write_cloud, write_footprints
+
+HOUSES = 9
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """The folder of a run over a town of nine houses, beside its cloud."""
+    folder, town = tmp_path_factory.mktemp("run"), make_town(HOUSES)
+    cloud = write_cloud(folder / "first.laz", town.xyz, town.classification)
+    outlines = write_footprints(folder / "outlines.geojson", town.footprints)
+    reconstruct_area(Request((str(cloud),), folder / "models", str(outlines), id_attribute="id"))
+    return folder / "models"
+
+
+def update(run, out, cloud, **options):
+    """Return the texts of an update's warnings, and its buildings by class."""
+    parameters = str(run / "parameters.jsonl")
+    options |= {"run": run, "run_parameters": parameters, "date": "2024-05-01"}
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        summary = update_area(UpdateRequest((str(cloud),), out, **options))
+    return [str(w.message) for w in caught], summary.by_change
+
+
+def write_later(folder, aside=(0.0, 0.0, 0.0)):
+    town = make_town(HOUSES, seed=5)
+    return write_cloud(folder / "later.laz", town.xyz + np.array(aside), town.classification)
+
+
+def test_a_survey_and_outlines_as_they_should_be_get_no_warning(run, tmp_path):
+    outlines = write_footprints(tmp_path / "new.geojson", make_town(HOUSES).footprints)
+    given = {"footprints": str(outlines), "id_attribute": "id"}
+    texts, classes = update(run, tmp_path / "out", write_later(tmp_path), **given)
+    assert not texts
+    assert classes == {"unchanged": HOUSES}
+
+
+def test_a_copy_of_the_earlier_cloud_is_told(run, tmp_path):
+    copy = shutil.copy(run.parent / "first.laz", tmp_path / "later.laz")
+    (text,) = update(run, tmp_path / "out", copy)[0]
+    assert "9 of 9 sampled roofs have the points of the earlier survey" in text
+
+
+@pytest.mark.parametrize("way", ["ids of neighbours", "one house further"])
+def test_outlines_with_the_ids_of_other_buildings_are_told(run, way, tmp_path):
+    outlines = make_town(HOUSES).footprints
+    if way == "ids of neighbours":
+        ids = list(outlines)
+        outlines = dict(zip(ids[1:] + ids[:1], outlines.values(), strict=True))
+    else:
+        outlines = {id: shapely.affinity.translate(o, 30.0) for id, o in outlines.items()}
+    file = str(write_footprints(tmp_path / "new.geojson", outlines))
+    given = {"footprints": file, "id_attribute": "id"}
+    texts, _ = update(run, tmp_path / "out", write_later(tmp_path), **given)
+    (text,) = [text for text in texts if "lie on another building" in text]
+    assert f" of {HOUSES} footprints lie on another building than the one with their id" in text
+
+
+@pytest.mark.parametrize("aside", [(1.5, 0.0, 0.0), (0.0, 0.0, 43.0), (-2.0, 2.0, 0.3)])
+def test_where_most_buildings_count_as_changed_the_shift_is_doubted(run, aside, tmp_path):
+    texts, classes = update(run, tmp_path / "out", write_later(tmp_path, aside))
+    assert classes["changed"] >= 8
+    assert any("count as changed, more than a town has" in text for text in texts)
