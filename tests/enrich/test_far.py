@@ -1,6 +1,7 @@
 """The far horizon: of terrain models whose hills are known, and of files of PVGIS."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -27,14 +28,14 @@ def read_few_places(monkeypatch):
     monkeypatch.setattr(far, "MOST_PLACES", 40_000)
 
 
-def write_hill(path, side=9000.0, pixel=25.0):
-    """Write level ground of height 0 with a hill in the south that ends in a plain above."""
+def write_hill(path, side=9000.0, pixel=25.0, ground=0.0):
+    """Write level ground with a hill in the south that ends in a plain above."""
     from rasterio.transform import from_origin
 
     count = int(side / pixel)
     south = (np.arange(count) + 0.5) * pixel - side / 2
     rise = np.clip((south - HILL_M) * SLOPE, 0.0, FOOT_M * SLOPE)
-    heights = np.repeat(rise[:, None], count, axis=1).astype("float32")
+    heights = ground + np.repeat(rise[:, None], count, axis=1).astype("float32")
     corner = from_origin(WORLD[0] - side / 2, WORLD[1] + side / 2, pixel, pixel)
     shape = {"width": count, "height": count, "count": 1, "dtype": "float32"}
     with rasterio.open(path, "w", crs="EPSG:28992", transform=corner, **shape) as file:
@@ -64,6 +65,18 @@ def test_terrain_that_is_elsewhere_is_refused(tmp_path):
     folder = write_street(tmp_path / "run", [far])
     settings = EnrichSettings(sun=True, shading_terrain=write_hill(tmp_path / "hill.tif"))
     with pytest.raises(InputError, match="expected a terrain model around the buildings, got terr"):
+        enrich_run(folder, settings=settings)
+
+
+@pytest.mark.parametrize("ground", [43.0, -6.0, 7.5])
+def test_terrain_of_other_heights_is_refused(ground, tmp_path):
+    """Ellipsoidal heights, or a surface model at the height of the roofs, would shade all."""
+    folder = write_street(tmp_path / "run", [place_house(f"h{k}", 30.0 * k, 0) for k in range(3)])
+    hill = write_hill(tmp_path / "hill.tif", ground=ground)
+    settings = EnrichSettings(sun=True, shading_terrain=hill)
+    with pytest.raises(
+        InputError, match=re.escape(f"which lies {ground:+.1f} m from it; check its height")
+    ):
         enrich_run(folder, settings=settings)
 
 

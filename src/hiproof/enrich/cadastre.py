@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import shapely
 
+from ..city.work.ground import OTHER_GROUND_M
 from ..compose.blocks import make_box
 from ..errors import InputError
 from ..model import ROOF, Building, Solid
@@ -136,6 +137,8 @@ FOR_SUN = {
     "shading_terrain": "--terrain",
     "sun_on_walls": "--sun-on-walls",
 }
+
+MOST_ASKED = 60  # buildings whose ground is compared with a terrain model
 
 Surfaces = dict[int, dict[str, Any]]  # attributes of faces by number
 
@@ -279,4 +282,23 @@ def refuse_unfit(records: Records, settings: EnrichSettings) -> None:
     if settings.sun and len(modelled):
         Cadastre(Town(records), settings).find_sky(int(modelled[0]))
         if settings.shading_terrain:
-            open_terrain(records, settings.shading_terrain)
+            refuse_other_heights(records, modelled, settings.shading_terrain)
+
+
+def refuse_other_heights(records: Records, modelled: np.ndarray, path: str) -> None:
+    """Raise InputError where a terrain model lies far above or below the ground of buildings.
+
+    In another height system, another unit or with the buildings in it, it would shade them all.
+    """
+    terrain, _, _ = open_terrain(records, path)
+    chosen = modelled[np.linspace(0, len(modelled) - 1, MOST_ASKED).astype(int)]
+    ground = np.array([records.read(number).z_ground for number in np.unique(chosen)])
+    boxes = records.index.boxes[np.unique(chosen)]
+    gaps = terrain.height_at((boxes[:, :2] + boxes[:, 2:]) / 2) - ground
+    gap = float(np.median(gaps[np.isfinite(gaps)])) if np.isfinite(gaps).any() else 0.0
+    if abs(gap) > OTHER_GROUND_M:
+        raise InputError(
+            f"expected a terrain model at the ground of the buildings, got {terrain.source} in "
+            f"{path}, which lies {gap:+.1f} m from it; check its height system and its unit, and "
+            "that it is a model of the terrain without buildings"
+        )
