@@ -64,7 +64,7 @@ def is_sound(solid: Solid) -> bool:
 def cut_polygon(
     polygon: shapely.Polygon, regions: Sequence[Region], thinnest: float
 ) -> list[Piece]:
-    """Cut a wall into party walls, the first first, and the rest, none below `thinnest` (m)."""
+    """Cut a wall into party walls, earlier regions first, and a rest, none too thin (m)."""
     rest: shapely.Geometry = shapely.set_precision(polygon, GRID_M)
     party: list[Piece] = []
     for name, region in regions:

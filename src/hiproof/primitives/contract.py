@@ -194,7 +194,7 @@ class Primitive:
         )
 
     def vertices(self, theta_p: Mapping[str, float]) -> np.ndarray:
-        """Return vertices (n, 3) in the primitive frame, S = f(theta_p); FitError if one lacks."""
+        """Return vertices (n, 3), S = f(theta_p); raises FitError where a parameter is missing."""
         shape = self.variant(theta_p)
         missing = [name for name in shape.parameters if name not in theta_p]
         if missing:

@@ -439,7 +439,7 @@ def compute_planes(
 def read_member(
     name: str, parameters: Mapping[str, float], kappa: float, translation: np.ndarray
 ) -> Member:
-    """Read a member of the catalogue's or each side's parameters; FitError if one lacks."""
+    """Read a member of its parameters, the catalogue's or each side's; FitError without one."""
     if name not in CATALOGUE:
         raise FitError(
             f"expected a roof type ({', '.join(CATALOGUE)}), got {name!r}; choose one of these"

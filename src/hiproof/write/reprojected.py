@@ -135,7 +135,7 @@ def make_reprojection(crs: Any, out: Any, source_units: Units, units: Units) -> 
 
 
 def height_way(crs: Any, out: Any) -> Any:
-    """Return the transformer of two CRSs with heights; InputError if these or grids lack."""
+    """Return the transformer of two CRSs with heights; InputError without these or a grid."""
     way = find_best_transformer(crs, out, allow_ballpark=False) if has_heights(crs) else None
     if way is None:
         missing = (

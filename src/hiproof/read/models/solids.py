@@ -91,7 +91,7 @@ def number_solids(name: str, solids: list[Solid]) -> Iterator[tuple[str, Solid]]
 
 
 def cityjson_solids(path: Path, damaged: Damaged = refuse) -> Iterator[tuple[str, Solid]]:
-    """Yield shells of CityJSON 1.x, 2.0 or Seq; a line lacks no transform of one before."""
+    """Yield the shells of CityJSON 1.x, 2.0 or CityJSONSeq; a transform holds for later lines."""
     for feature in features(path, damaged=damaged):
         for name, city_object in feature.objects.items():
             try:
