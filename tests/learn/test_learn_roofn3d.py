@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from hiproof.errors import InputError
-from hiproof.learn.data import open_source
-from hiproof.learn.roofn3d import BUILDINGS_FILE, SURFACES_FILE, TRAINING_TYPES
+from hiproof.learn.data import BUILDINGS_FILE, SURFACES_FILE, TRAINING_TYPES, open_source
 from hiproof.learn.sample import TEST, TRAINING
 from hiproof.segment.inference import NOT_ROOF
 from hiproof.simulate import training_sample

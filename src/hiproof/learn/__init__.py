@@ -4,8 +4,7 @@ The package has the network, data sets, training and export.
 
     sample     a labelled cloud, what a source of them is, and random changes of clouds
     houses     houses made up for training, with annexes
-    roofn3d    RoofN3D's real clouds
-    data       the source that a name stands for; real shapes: solids with a roofType
+    data       the source that a name stands for; RoofN3D; real shapes: solids with a roofType
     network    PointNet++ in PyTorch, and arranged clouds as its tensors
     training   the recipe, checkpoints and the best by validation
     export     to the ONNX file that `segment` runs; training curve and model card
