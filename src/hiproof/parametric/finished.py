@@ -156,8 +156,9 @@ def make_building(model: BuildingModel) -> Building:
     if model.solid is None:
         return Building(model.id, status, attributes=attributes)
     named = name_faces(model.solid)
-    types = [model.part_types.get(k, model.roof_type) for k in list_parts(named)]
-    number = {part: k for k, part in enumerate(list_parts(named))}
+    parts = sorted({face.part for face in named.select_faces(ROOF)})
+    types = [model.part_types.get(k, model.roof_type) for k in parts]
+    number = {part: k for k, part in enumerate(parts)}
     faces = (
         dataclasses.replace(face, part=number[face.part] if face.kind == ROOF else -1)
         for face in named.faces
@@ -181,10 +182,6 @@ def name_faces(solid: Solid) -> Solid:
         for face, kind in zip(solid.faces, kinds, strict=True)
     )
     return dataclasses.replace(solid, faces=tuple(faces))
-
-
-def list_parts(solid: Solid) -> list[int]:
-    return sorted({face.part for face in solid.select_faces(ROOF)})
 
 
 def trace_roof(solid: Solid, types: list[str]) -> Roof:
