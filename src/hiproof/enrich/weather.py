@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import functools
 import io
+import warnings
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, InputWarning
 from ..extras import import_extra
 from ..log import count_things
 
@@ -38,7 +39,7 @@ GREATEST_GAP = 0.15
 share of the year: 0.003 in pvlib's TMY3 files, 0.06 where hours are half of one off.
 """
 GREATEST_GAP_WM2 = 300.0  # of either in one hour (W/m2); up to 250 where hours are one off
-LEAST_CLEARNESS = 0.2  # of the radiation above the atmosphere: 0.3 in the dullest climates on Earth
+LEAST_CLEARNESS = 0.1  # of the radiation above the atmosphere: 0.3 in the dullest climates on Earth
 BRIGHTEST, LEAST_BRIGHTNESS = 0.99, 0.5
 """Quantile of the hours with a high sun, and the share of the radiation above the atmosphere that
 it has to reach: clear skies let 0.7 to 0.8 pass, and every climate has clear hours.
@@ -226,11 +227,6 @@ def refuse_other_sun(weather: Weather, path: str) -> None:
         got = f"diffuse and direct radiation {gaps.sum() / total:.0%} off the global"
     elif share < LEAST_CLEARNESS:
         got = f"only {share:.1%} of what reaches the atmosphere in a year"
-    elif brightness < LEAST_BRIGHTNESS:
-        got = (
-            f"no clear hours: the brightest have {brightness:.0%} of what reaches the atmosphere, "
-            "so the unit is wrong, W/m2 are usual"
-        )
     elif is_dark.any():
         day = weather.times[24 * int(is_dark.argmax())]
         got = (
@@ -240,6 +236,13 @@ def refuse_other_sun(weather: Weather, path: str) -> None:
         raise InputError(
             f"expected radiation in {path} that fits the sun over its station, got {got}; use "
             "another file"
+        )
+    if brightness < LEAST_BRIGHTNESS:
+        warnings.warn(
+            f"{path}: has no clear hours; the brightest have {brightness:.0%} of what reaches the "
+            "atmosphere, and 70 % are usual, so all sun may be too low; check that the unit is "
+            "W/m2",
+            InputWarning,
         )
 
 
