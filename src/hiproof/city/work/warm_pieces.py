@@ -41,7 +41,7 @@ def moves() -> None:
     Moves come first, so that `planes` is ready elsewhere when it is needed.
     """
     from ...fit.roof import fit_building
-    from ...fit.shapes.rounds import find_disc
+    from ...fit.shapes.rounds import find_disc, measure_round_gaps
     from ...fit.union.improve import improve
     from ...fit.union.objective import compute_objective
     from ...fit.union.volumes import make_base
@@ -50,7 +50,8 @@ def moves() -> None:
     value = compute_objective(base, scene, np.inf)
     improve(base, scene, value, np.array([0.7]), 1)
     fit_building(house(), L_OUTLINE)
-    find_disc(house(), np.zeros(2), 1.0)  # a house so simple asks for none
+    centre, _ = find_disc(house(), np.zeros(2), 1.0)  # a house so simple asks for none
+    measure_round_gaps(house(), centre)
 
 
 def planes() -> None:

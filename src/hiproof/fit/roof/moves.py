@@ -69,6 +69,7 @@ MOST_SHARED_M = (
     40.0  # A part of a roof so wide (m) is priced whole. What lies beyond keeps its value.
 )
 SAME_FAR = 0.03  # The same of volumes that are not near each other.
+MOST_ALIKE = 2  # Most unknowns, the next higher ones, that each may be one with.
 ALIKE_SLOPES, ALIKE_HEIGHTS_M = 0.2, 0.7  # Unknowns (rise over run, m) nearer than this may be one.
 
 
@@ -170,7 +171,7 @@ def list_equal_planes(roof, site, j, k, moves, count):
 
 @compiled
 def list_shares(roof, site, asked, moves, count):
-    """Write the pairs of unknowns nearly alike, of volumes that lie in one part of the roof."""
+    """Write the pairs of unknowns next to each other in value that are nearly alike."""
     n = roof.counts[UNKNOWN_COUNT]
     kinds, boxes, is_asked = np.zeros(n, np.int64), np.zeros((n, 4)), np.zeros(n, np.bool_)
     for k in range(roof.counts[VOLUME_COUNT]):
@@ -186,11 +187,16 @@ def list_shares(roof, site, asked, moves, count):
                 box[2], box[3] = min(box[2], other[2]), max(box[3], other[3])
                 kinds[u] = kind
                 is_asked[u] |= asked[k]
-    for a in range(n):
-        for b in range(a + 1, n):
+    order = np.argsort(roof.values[:n])
+    for i in range(n):
+        found = 0
+        for j in range(i + 1, n):
+            a, b = min(order[i], order[j]), max(order[i], order[j])
+            gap = roof.values[order[j]] - roof.values[order[i]]
+            if gap >= ALIKE_HEIGHTS_M or found == MOST_ALIKE:
+                break
             if kinds[a] == 0 or kinds[a] != kinds[b] or not (is_asked[a] or is_asked[b]):
                 continue
-            gap = abs(roof.values[a] - roof.values[b])
             box = boxes[b]
             is_close = is_near(boxes[a], box, NEIGHBOUR_M)
             alike = ALIKE_HEIGHTS_M if kinds[a] == 1 else ALIKE_SLOPES
@@ -202,6 +208,7 @@ def list_shares(roof, site, asked, moves, count):
             )
             if gap >= (alike if is_close else SAME_FAR):
                 continue
+            found += 1
             if max(wide, deep) < MOST_SHARED_M:
                 count = write_move(moves, count, SHARE, a, b, 0, 0)
             elif measure_box_area(boxes[a]) > measure_box_area(box):

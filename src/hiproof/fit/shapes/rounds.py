@@ -50,6 +50,7 @@ FEWEST_POINTS = 6  # A slope and a height, and as many points again to check the
 MOST_ASKED = 200  # Most points of a disc that say whether it is round: of more, every k-th does.
 CENTRE_ROUNDS = 3  # Rounds in which the middle of a disc is found.
 LEAST_RISE_M = 0.01  # A point of a disc rises at least so far (m) above its mean.
+SPIRE_SIDES = (BROACH_SIDES, HEXAGON_SIDES)  # What the facets of spires repeat.
 RIDGE = 1e-6  # It keeps what no point determines.
 GROWTH = 3.0  # A shape reaches out to so many times the radius with which it begins at most.
 GROWTH_ROUNDS = 2  # Rounds in which a shape is fitted to all points that follow it.
@@ -140,25 +141,38 @@ def find_disc(points, start, radius):
     return np.array([x, y]), disc[:count]
 
 
-def measure_round_gaps(points: np.ndarray, centre: np.ndarray) -> np.ndarray:
+@compiled
+def measure_round_gaps(points, centre):
     """Return about how far points (n, 3) lie from the nearest round shape or spire.
 
     Without a fall from the middle there is none.
     """
-    x, y = (points[:, :2] - centre).T
-    r, turn = np.hypot(x, y), np.arctan2(y, x)
-    sides = (BROACH_SIDES, HEXAGON_SIDES)
-    waves = [r * wave(n * turn) for n in sides for wave in (np.cos, np.sin)]
-    design = np.stack([np.ones_like(r), r, r * r, np.cos(turn), np.sin(turn), *waves])
-    is_near = np.ones(len(r), bool)
+    n, farthest, terms = len(points), 0.0, 5 + 2 * len(SPIRE_SIDES)
+    design, is_near, gaps = np.ones((n, terms)), np.ones(n, np.bool_), np.empty(n)
+    solution = np.empty(terms)
+    for i in range(n):
+        x, y = points[i, 0] - centre[0], points[i, 1] - centre[1]
+        r, turn = np.hypot(x, y), np.arctan2(y, x)
+        design[i, 1], design[i, 2], design[i, 3], design[i, 4] = r, r * r, np.cos(turn), np.sin(turn)
+        for k in range(len(SPIRE_SIDES)):
+            angle = SPIRE_SIDES[k] * turn
+            design[i, 5 + 2 * k], design[i, 6 + 2 * k] = r * np.cos(angle), r * np.sin(angle)
+        farthest = max(farthest, r)
     for _ in range(GROWTH_ROUNDS):
-        some = design[:, is_near]
-        normal = some @ some.T + RIDGE * np.eye(len(some))
-        solution = np.linalg.solve(normal, some @ points[is_near, 2])
-        gaps = np.abs(points[:, 2] - solution @ design)
-        is_near = gaps <= max(LEAST_FALL_M, 2.0 * compute_median(gaps))
-    falls = -r.max() * (solution[1] + solution[2] * r.max()) >= LEAST_FALL_M
-    return gaps if falls else np.full(len(r), np.inf)
+        normal, vector = RIDGE * np.eye(terms), np.zeros(terms)
+        for i in range(n):
+            for a in range(terms if is_near[i] else 0):
+                vector[a] += design[i, a] * points[i, 2]
+                for b in range(terms):
+                    normal[a, b] += design[i, a] * design[i, b]
+        solution = np.linalg.solve(normal, vector)
+        for i in range(n):
+            gaps[i] = abs(points[i, 2] - (design[i] * solution).sum())
+        reach = max(LEAST_FALL_M, 2.0 * compute_median(gaps))
+        for i in range(n):
+            is_near[i] = gaps[i] <= reach
+    falls = -farthest * (solution[1] + solution[2] * farthest) >= LEAST_FALL_M
+    return gaps if falls else np.full(n, np.inf)
 
 
 def fit_followers(
