@@ -153,7 +153,8 @@ def measure_round_gaps(points, centre):
     for i in range(n):
         x, y = points[i, 0] - centre[0], points[i, 1] - centre[1]
         r, turn = np.hypot(x, y), np.arctan2(y, x)
-        design[i, 1], design[i, 2], design[i, 3], design[i, 4] = r, r * r, np.cos(turn), np.sin(turn)
+        design[i, 1], design[i, 2] = r, r * r
+        design[i, 3], design[i, 4] = np.cos(turn), np.sin(turn)
         for k in range(len(SPIRE_SIDES)):
             angle = SPIRE_SIDES[k] * turn
             design[i, 5 + 2 * k], design[i, 6 + 2 * k] = r * np.cos(angle), r * np.sin(angle)
