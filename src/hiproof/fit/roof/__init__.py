@@ -11,7 +11,7 @@ moves       compiled: moves of a roof, which propose and do not judge
 accept      compiled: the one place that judges, and the loop
 site        what a roof has to explain: points, cells, the outline and its lines
 start       the tables of the volumes that the search found
-add         volumes added where points that the search had not are unexplained
+add         volumes added where points are unexplained
 beside      how far the points lie beside the outline
 deviations  compiled: how well points determine unknowns and sides
 regions     which polygons each volume roofs
@@ -44,7 +44,7 @@ from ..union.objective import is_base_visible
 from ..union.outline import draw_outline
 from ..union.plan import Plan, lay_out_plan
 from ..union.scene import VISIBLE_DEPTH_M, Scene, place_nodes
-from ..union.search import SEARCH_POINTS, find_volumes
+from ..union.search import find_volumes
 from ..union.whole import Whole
 from .accept import LOOP_ROUNDS, improve
 from .add import add_volumes
@@ -119,20 +119,19 @@ def name_volumes(
     keeps_shapes = bool(types) and not {*CATALOGUE} <= {*types, *CURVED}
     site = make_site(scene, plan_outline, unit, plan.border, keeps_shapes)
     roof = start_roof(volumes, scene, site)
-    whole = Whole(scene, plan, outline) if scene.n > SEARCH_POINTS else None
-    roof, site = improve_beside(roof, site, whole)
+    roof, site = improve_beside(roof, site, Whole(scene, plan, outline))
     return read_parts(roof, site, plan_outline, plan, types)
 
 
-def improve_beside(roof: Tables, site: Site, whole: Whole | None) -> tuple[Tables, Site]:
+def improve_beside(roof: Tables, site: Site, whole: Whole) -> tuple[Tables, Site]:
     """Improve a roof, also with its points moved to where its eaves are level, if that is cheaper.
 
-    Volumes are added to a roof of which the search had some of the points alone: `whole` has all.
-    Returns the roof and the site that it explains.
+    Volumes are added where points of the `whole` are unexplained. Returns the roof and the site
+    that it explains.
     """
     trial, drawing = make_tables_like(roof), make_drawing(len(roof.sides))
     cost = improve_all(roof, trial, site, drawing)
-    if whole is not None and add_volumes(roof, trial, site, drawing, whole):
+    if add_volumes(roof, trial, site, drawing, whole):
         cost = improve_all(roof, trial, site, drawing)
     shift = estimate_shift(roof, site)
     if not shift.any():

@@ -16,6 +16,7 @@ from .regions import list_polygons, unite_outlines
 
 BARREL_LIKE = ("gable", "asymmetric_gable", "truncated_gable", "gambrel")  # What is made of one.
 CURVE_ROUNDS = 2  # The second leaves out points beside the vault, such as those of a wall's top.
+BEND_NUMBERS = 1  # Points alone say that a roof of two slopes is bent: how much is one number.
 ENDS_M = 0.5  # Parts of one vault end within this distance (m) of each other.
 
 
@@ -34,8 +35,10 @@ def list_barrels(roof: PartsRoof, part: Part, settings: Settings) -> Iterator[tu
         seen = roof.find_seen(group)
         gaps = measure_arc_gaps(x[seen], roof.points[seen, 2])
         covered = list_polygons(unite_outlines(group))
-        if len(covered) == 1 and roof.is_worth(seen, roof.price_gaps(gaps).sum()):
-            yield from ((vault, 0) for vault in fit_over(roof, covered[0], ["barrel"], settings))
+        if len(covered) == 1 and roof.is_worth(seen, roof.price_gaps(gaps).sum(), BEND_NUMBERS):
+            yield from (
+                (vault, BEND_NUMBERS) for vault in fit_over(roof, covered[0], ["barrel"], settings)
+            )
 
 
 def find_ends(part: Part, along: np.ndarray) -> np.ndarray:

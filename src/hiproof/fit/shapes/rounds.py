@@ -149,7 +149,6 @@ def measure_round_gaps(points, centre):
     """
     n, farthest, terms = len(points), 0.0, 5 + 2 * len(SPIRE_SIDES)
     design, is_near, gaps = np.ones((n, terms)), np.ones(n, np.bool_), np.empty(n)
-    solution = np.empty(terms)
     for i in range(n):
         x, y = points[i, 0] - centre[0], points[i, 1] - centre[1]
         r, turn = np.hypot(x, y), np.arctan2(y, x)
