@@ -21,10 +21,10 @@ LEAN_STEP = 0.02  # Steps (rise over run) in which a line leans.
 
 
 @compiled
-def find_end(roof, k, s, site):
+def find_end(roof, k, s, site, leans):
     """Return a, b, c of the line along which side s of volume k tells most points apart.
 
-    All are 0 where points do not say so clearly that it pays.
+    It may lean (`leans`). All are 0 where points do not say so clearly that it pays.
     """
     x, y, length = measure_middle(roof, k, s, site.bounds)
     if length == 0.0:
@@ -38,9 +38,9 @@ def find_end(roof, k, s, site):
     best, best_lean, best_end = 0, 0.0, 0.0
     for i in range(count):
         best += int(is_on[i] == (across[i] >= 0.0))
-    best += int(LEAN_UNITS * site.unit / step)  # what it costs, if it leans
+    best += int(LEAN_UNITS * site.unit / step) if leans else 0
     is_better, middle = False, 0.0
-    for turn in range(2 * LEANS + 3):
+    for turn in range(2 * LEANS + 3 if leans else 1):
         lean = (turn + 1) // 2 * (LEAN_STEP if turn % 2 else -LEAN_STEP)
         if turn == 2 * LEANS + 1:
             middle = best_lean

@@ -389,7 +389,7 @@ def apply_move(roof, move, site, changed):
             roof.plane_lines[a, b], roof.heights[a, b] = roof.plane_lines[c, d], roof.heights[c, d]
             roof.slopes[a, b] = roof.slopes[c, d]
     elif kind == TO_POINTS:
-        d, e, f = find_end(roof, a, b, site)
+        d, e, f = find_end(roof, a, b, site, True)
         is_possible = d != 0.0 or e != 0.0
         if is_possible:
             roof.sides[a, b] = add_line(roof, d, e, f, LEAN_UNITS)

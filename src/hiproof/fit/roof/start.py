@@ -19,6 +19,7 @@ from ..union.volumes import (
     U0,
     V1,
 )
+from .ends import find_end
 from .moves import LINE_COSINE
 from .price import list_points, list_view, price_misfit
 from .tables import (
@@ -66,6 +67,16 @@ def add_volume(roof: Tables, volume: np.ndarray, turns: np.ndarray) -> int:
     add_planes(roof, row, volume, axes)
     place_volume(roof, row)
     return row
+
+
+@compiled
+def put_on_ends(roof, k, site):
+    """Put each side of volume k where points say that it ends, along the line that it has."""
+    for s in range(N_SIDES):
+        a, b, c = find_end(roof, k, s, site, False)
+        if a != 0.0 or b != 0.0:
+            roof.sides[k, s] = add_line(roof, a, b, c)
+            place_volume(roof, k)
 
 
 @compiled
