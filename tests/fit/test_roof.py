@@ -239,3 +239,16 @@ def test_volumes_are_added_to_a_large_roof_while_its_price_falls(seed, monkeypat
     monkeypatch.setattr(add, "list_additions", note_price)
     fit_building(*scan_cluttered_roof(seed))
     assert prices
+
+
+def test_a_dormer_is_found_however_dense_the_cloud():
+    """The search takes 600 points, of which a dormer of 3 m2 on a large roof has hardly a dozen."""
+    found, outline = 0, shapely.box(0.0, 0.0, 12.0, 12.0)
+    for seed in range(20):
+        rng, n = np.random.default_rng(seed), 3600
+        x, y = rng.uniform(0.0, 12.0, (2, n))
+        is_dormer = (np.abs(x - 4.0) < 0.9) & (np.abs(y - 2.4) < 0.9)
+        z = np.maximum(10.0 - 0.7 * np.abs(y - 6.0), np.where(is_dormer, 8.6, 0.0))
+        points = np.column_stack([x, y, z + rng.normal(0.0, 0.03, n)])
+        found += len(fit_building(points, outline).roof_parts) == 2
+    assert found >= 17

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import shapely
+from benchmarks.compounds import draw_compound
 from benchmarks.curved import DRUM_SETTINGS, draw_scene, is_drum_found, judge_scene, make_disc
 
 import hiproof
@@ -301,3 +302,10 @@ def test_curved_shapes_of_every_size_are_valid_solids(kind, width):
     # The smallest facets of a small dome are one face, and the tip of a small onion is cut off.
     tolerance_m = 0.2 if (kind, width) == ("onion", 1.6) else 0.05
     assert solid.vertices[:, 2].max() == pytest.approx(6.0 + theta_p["height"], abs=tolerance_m)
+
+
+@pytest.mark.parametrize("seed", [2009, 2010, 2015])  # of twenty, those whose gables were bent
+def test_a_gable_is_no_barrel_because_a_bend_fits_a_little_better(seed):
+    building, points = draw_compound("dormered", 10.0, seed)
+    types = [part.type for part in fit_building(points, building.outline).roof_parts]
+    assert "gable" in types and "barrel" not in types
