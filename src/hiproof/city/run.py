@@ -25,7 +25,6 @@ from ..garbage import collect_rarely
 from ..log import LOGGER, count_things
 from ..masking import mask, masked_values
 from ..progress import show_in_notebook
-from ..stages.recognise import fits_one
 from ..status import Doubt
 from ..write.files import save_text
 from ..write.head import FileHead
@@ -46,7 +45,6 @@ from .work.executors import make_executor
 from .work.queue import Queue
 from .work.tasks import (
     MAIN_JOB,
-    ONE_PRIMITIVE,
     WITHOUT_FOOTPRINTS,
     solve_tile,
     sort_cloud,
@@ -195,9 +193,7 @@ def count_processes(request: Request, ledger: Ledger) -> int:
 
 def list_compiled_pieces(request: Request) -> tuple[str, ...]:
     """Return the pieces of compiled code that the run needs."""
-    if request.footprints is None:
-        return WITHOUT_FOOTPRINTS
-    return ONE_PRIMITIVE if fits_one(request.settings) else MAIN_JOB
+    return WITHOUT_FOOTPRINTS if request.footprints is None else MAIN_JOB
 
 
 class Clock:

@@ -11,13 +11,10 @@ from collections.abc import Sequence
 from importlib import import_module
 from typing import Any, TypeAlias
 
-MAIN_JOB = ("moves", "planes", "solid", "points")
+MAIN_JOB = ("moves", "planes", "solid", "points", "single")
 """Pieces of compiled code (warm_pieces.py) that every run needs, the longest first."""
 
-ONE_PRIMITIVE = (*MAIN_JOB, "single")
-"""Those of runs that fit one primitive a building."""
-
-WITHOUT_FOOTPRINTS = (*ONE_PRIMITIVE, "outlines")
+WITHOUT_FOOTPRINTS = (*MAIN_JOB, "outlines")
 """Those of runs without footprints."""
 
 

@@ -95,7 +95,7 @@ def solid() -> None:
 def single() -> None:
     """Compile the fit of one primitive by itself.
 
-    A roof without a footprint, or `--parts one`, begins with it.
+    A roof without a footprint, or `--parts one`, begins with it, and vaults are fitted so.
     """
     from ...fit import fit_roof
 
