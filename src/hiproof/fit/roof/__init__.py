@@ -152,7 +152,7 @@ def start_roof(volumes: np.ndarray, scene: Scene, site: Site) -> Tables:
     """Return the tables of the search's volumes along walls."""
     roof = make_roof(volumes, scene.turn, is_base_visible(volumes, scene))
     for k in range(roof.counts[VOLUME_COUNT]):
-        put_on_walls(roof, k, site)
+        put_on_walls(roof, k, site, False)
     return roof
 
 

@@ -27,7 +27,7 @@ from ..union.window import open_window
 from .accept import LEAST_UNITS, improve
 from .draw import Drawing, compute_heights
 from .price import OVER_M, Site
-from .start import add_volume, put_on_ends, put_on_walls
+from .start import add_volume, put_on_walls
 from .tables import VOLUME_COUNT, Tables, copy_tables, make_tables_like
 
 SQUARE_M = 3.0  # Size (m) of a square in which unexplained points are counted.
@@ -82,8 +82,7 @@ def add_best(
     for volume in list_additions(roof, scene):
         copy_tables(roof, new)
         k = add_volume(new, volume, scene.turn)
-        put_on_ends(new, k, site)
-        put_on_walls(new, k, site)
+        put_on_walls(new, k, site, True)
         asked = np.arange(len(roof.sides)) == k
         cost = improve(new, trial, site, drawing, asked, 1)
         if cost < lowest:

@@ -80,12 +80,18 @@ def put_on_ends(roof, k, site):
 
 
 @compiled
-def put_on_walls(roof, k, site):
+def put_on_walls(roof, k, site, is_new):
     """Put each side of volume k on the line of the outline near it that costs least, if any.
+
+    The sides of one that `is_new`, for which nothing sought an end yet, go where points end first.
 
     A line costs what points then miss, more the further it is off, and more if it is no edge of the
     outline but joins two corners. Along none, a side costs a fixed sum.
     """
+    if is_new:
+        put_on_ends(roof, k, site)
+    if is_new:
+        put_on_ends(roof, k, site)
     for s in range(N_SIDES):
         x, y, length = measure_middle(roof, k, s, site.bounds)
         if length == 0.0:
