@@ -62,7 +62,7 @@ def test_a_side_lies_on_a_wall_near_it_unless_points_lie_elsewhere(end, drawn_en
     site = make_site(scene, shapely.transform(outline, plan.frame.uv_plan), 3.0, np.zeros((3, 0)))
     volumes[1, U1] = drawn_end
     roof = make_roof(volumes, scene.turn, True)
-    put_on_walls(roof, 1, site)
+    put_on_walls(roof, 1, site, False)
     ends = -roof.half_planes[1, :2, 2] * roof.half_planes[1, :2, 0]
     assert ends == pytest.approx([-4.0, place], abs=1e-9)
 
