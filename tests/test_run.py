@@ -4,6 +4,7 @@ way.
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -23,6 +24,8 @@ from hiproof.city.run import Request, reconstruct_area
 from hiproof.city.work.tasks import MAIN_JOB, WITHOUT_FOOTPRINTS, make_ready
 from hiproof.cli import main
 from hiproof.cli.app import app
+from hiproof.compiled import kept
+from hiproof.compiled.stamp import PACKAGE
 from hiproof.compose import check_solid
 from hiproof.errors import InputError
 from hiproof.evaluate.run import evaluate_run
@@ -228,15 +231,24 @@ def test_two_workers_change_no_byte_and_compile_nothing(finished_run, files, tmp
 
 
 def test_the_main_process_of_workers_imports_no_compiler(town_files, tmp_path):
+    """Its marks of what is compiled are its own: other tests remove those of another state."""
     make_ready(MAIN_JOB)
+    *_, place = places = kept.list_folders(PACKAGE)
+    marks = tmp_path / "kept" / place.name
+    marks.mkdir(parents=True)
+    for file in [file for folder in places for file in folder.glob("warm.*")]:
+        shutil.copy(file, marks)
     code = (
         "import sys; from hiproof import Request, reconstruct_area\n"
         "cloud, footprints, out = sys.argv[1:]\n"
         "summary = reconstruct_area(Request((cloud,), out, footprints, processes=2))\n"
         "print(summary.overview.headline, 'numba' in sys.modules)"
     )
-    command = [sys.executable, "-W", "ignore", "-c", code, *map(str, town_files), str(tmp_path)]
-    done = subprocess.run(command, capture_output=True, text=True)
+    command = [sys.executable, "-W", "ignore", "-c", code, *map(str, town_files)]
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "kept")}
+    done = subprocess.run(
+        [*command, str(tmp_path / "out")], capture_output=True, text=True, env=environment
+    )
     assert done.stdout == "4 of 4 buildings modelled False\n", done.stderr
 
 
