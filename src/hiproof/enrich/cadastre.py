@@ -291,9 +291,9 @@ def refuse_other_heights(records: Records, modelled: np.ndarray, path: str) -> N
     In another height system, another unit or with the buildings in it, it would shade them all.
     """
     terrain, _, _ = open_terrain(records, path)
-    chosen = modelled[np.linspace(0, len(modelled) - 1, MOST_ASKED).astype(int)]
-    ground = np.array([records.read(number).z_ground for number in np.unique(chosen)])
-    boxes = records.index.boxes[np.unique(chosen)]
+    chosen = np.unique(modelled[np.linspace(0, len(modelled) - 1, MOST_ASKED).astype(int)])
+    ground = np.array([records.read(number).z_ground for number in chosen])
+    boxes = records.index.boxes[chosen]
     gaps = terrain.height_at((boxes[:, :2] + boxes[:, 2:]) / 2) - ground
     gap = float(np.median(gaps[np.isfinite(gaps)])) if np.isfinite(gaps).any() else 0.0
     if abs(gap) > OTHER_GROUND_M:

@@ -413,9 +413,8 @@ def solve_shift(
         for _ in range(SHIFT_ROUNDS):
             _, inverse, gradients = weigh_rows(rows, shift)
             shift = shift + inverse @ (gradients.sum(axis=0) - PRIOR @ shift)
-        found.append((weigh_rows(rows, shift)[0], shift))
-    shift = min(found, key=lambda item: item[0])[1]
-    _, inverse, gradients = weigh_rows(rows, shift)
+        found.append((*weigh_rows(rows, shift), shift))
+    _, inverse, gradients, shift = min(found, key=lambda item: item[0])
     covariance = inverse @ (gradients.T @ gradients + PRIOR) @ inverse
     return shift, np.sqrt(np.diag(covariance) + ROOF_ERROR_M**2 / len(rows) / 4)
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from importlib import import_module
 from typing import Any, TypeAlias
 
-MAIN_JOB = ("moves", "planes", "solid", "points", "single")
+MAIN_JOB = ("moves", "planes", "single", "solid", "points")
 """Pieces of compiled code (warm_pieces.py) that every run needs, the longest first."""
 
 WITHOUT_FOOTPRINTS = (*MAIN_JOB, "outlines")

@@ -90,8 +90,6 @@ def put_on_walls(roof, k, site, is_new):
     """
     if is_new:
         put_on_ends(roof, k, site)
-    if is_new:
-        put_on_ends(roof, k, site)
     for s in range(N_SIDES):
         x, y, length = measure_middle(roof, k, s, site.bounds)
         if length == 0.0:
