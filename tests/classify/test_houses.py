@@ -115,3 +115,11 @@ def test_a_neck_of_returns_joins_no_houses_but_a_wing_does(width, count):
     houses = separate_houses(np.column_stack([xy, np.full(len(xy), 6.0)]), area, 1.0)
     assert len(houses) == count
     assert sum(house.area for house in houses) == pytest.approx(area.area)
+
+
+@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize(("width", "depth", "density"), [(16.0, 1.5, 1.5), (8.0, 2.0, 1.0)])
+def test_a_narrow_roof_of_few_points_is_one_house(width, depth, density, seed):
+    """No line has points on both of its sides, so there is nothing to cut."""
+    points, area, _ = block(gable, density, width, depth, seed)
+    assert len(separate_houses(points, area, 1.0)) == 1

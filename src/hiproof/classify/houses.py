@@ -388,7 +388,7 @@ def find_runs(
     run = np.cumsum(is_first) - 1
     count, gaps = np.bincount(run), np.bincount(run, loose > HOLD * held)
     gain = np.bincount(run, STRETCH_M * (loose - HOLD * held) / (held + loose + unknown))
-    last = stretch[np.append(begins[1:], len(line)) - 1]
+    last = stretch[np.append(is_first[1:], True)[: len(line)]]
     low, high = start + stretch[begins] * STRETCH_M, start + (last + 1) * STRETCH_M
     return line[begins], np.column_stack([low, high, gaps >= least_apart * count, gain])
 
