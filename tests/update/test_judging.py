@@ -15,11 +15,12 @@ from hiproof.simulate.roofs import assemble, make_part
 from hiproof.status import Change, ChangeKind
 from hiproof.update.cells import SurveyNoise
 from hiproof.update.clusters import compute_chance
+from hiproof.update.ground import Ground
 from hiproof.update.judge import judge_building
 from hiproof.update.kinds import name_differences
 from hiproof.update.register import SampledRoof, register_surveys
 
-NOISE, Z_GROUND = SurveyNoise(), 0.0
+NOISE, GROUND = SurveyNoise(), Ground(0.0)
 FLAT = {"length": 16.0, "width": 10.0}
 GABLE = {"length": 14.0, "width": 9.0, "height": 3.5}
 
@@ -42,7 +43,7 @@ def make_roof(kind="gable", parameters=None, eave=6.0):
 
 def judge(old, new, significance=0.001, **options):
     roof, points = old
-    return judge_building(roof, points, new, Z_GROUND, NOISE, 0.01, significance, **options)
+    return judge_building(roof, points, new, GROUND, NOISE, 0.01, significance, **options)
 
 
 @pytest.fixture
@@ -94,7 +95,7 @@ def test_every_kind_of_change_is_found_and_most_are_named(kind):
             new = np.concatenate([new, yard[bare]])
         verdict = judge((before.roof, scan(rng, before.roof)), new)
         assert verdict.change is Change.CHANGED
-        found = name_differences(verdict, before.roof, after.roof, Z_GROUND, 0.01)
+        found = name_differences(verdict, before.roof, after.roof, GROUND, 0.01)
         named.append(found[0].kind.code)
     assert named.count(kind) >= 5, named
 
@@ -110,7 +111,7 @@ def test_an_added_storey_is_measured_within_two_centimetres(rng):
     roof = make_roof()
     new = scan(rng, roof.roof) + (0.0, 0.0, 2.8)
     verdict = judge((roof.roof, scan(rng, roof.roof)), new)
-    (place,) = name_differences(verdict, roof.roof, None, Z_GROUND, 0.01)
+    (place,) = name_differences(verdict, roof.roof, None, GROUND, 0.01)
     assert place.kind is ChangeKind.ROOF_RAISED
     assert place.difference_m == pytest.approx(2.8, abs=0.02)
     assert place.sigma_m < 0.03

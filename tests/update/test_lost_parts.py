@@ -70,6 +70,34 @@ def test_what_lies_bare_is_lost_at_any_density(run, density, code, tmp_path):
         assert outlines[0].area - outlines[1].area == pytest.approx(area, rel=0.25), id
 
 
+def stand_on_slope(town, slope):
+    """Raise the ground of a town to a slope to the east and to the north, and houses with it."""
+    places = town.xyz[:, :2].copy()
+    for outline in town.footprints.values():
+        places[shapely.intersects_xy(outline, *town.xyz[:, :2].T)] = outline.centroid.coords[0]
+    is_roof = town.classification == 6
+    places[~is_roof] = town.xyz[~is_roof, :2]
+    town.xyz[:, 2] += (places - ORIGIN[:2]) @ slope
+    return town
+
+
+@pytest.mark.parametrize("slope", [(0.15, 0.0), (-0.1, 0.12), (0.2, 0.15)])
+def test_what_lies_bare_on_a_slope_is_lost(slope, tmp_path):
+    """The ground under a house is higher than its lowest place by more than a metre."""
+    town = stand_on_slope(make_town(density=8.0), np.array(slope))
+    cloud = write_cloud(tmp_path / "first.laz", town.xyz, town.classification)
+    outlines = write_footprints(tmp_path / "outlines.geojson", town.footprints)
+    reconstruct_area(Request((str(cloud),), tmp_path / "run", str(outlines), id_attribute="id"))
+    town = make_town(seed=7, density=8.0)
+    for id, kept in (KEPT | {"house-3": 0.0}).items():
+        lay_bare(town, id, kept)
+    town = stand_on_slope(town, np.array(slope))
+    after = update(tmp_path / "run", tmp_path / "out", town)
+    kinds = {id: take_kind(row) for id, row in after.items()}
+    expected = {"house-1": "unchanged"} | dict.fromkeys(KEPT, "part_removed")
+    assert kinds == expected | {"house-3": "demolished"}
+
+
 def lay_corner_bare(town, id, size):
     """Pull down a triangle at a corner of a house; return it."""
     x0, y0, _, _ = town.footprints[id].bounds

@@ -10,6 +10,7 @@ plan       the plan of the update, from the earlier buildings
 register   the common shift between the two surveys
 cells      heights of points over the earlier roof, and both surveys compared in cells of a metre
 clusters   connected cells that contradict the earlier roof, and how likely chance makes them
+ground     the ground under an earlier roof
 judge      the class of a building: unchanged, changed, gone, ...
 kinds      what changed: a part raised, a dormer built, ...
 before     the earlier points sorted and the surveys registered, before there are work tiles

@@ -33,6 +33,7 @@ from ..status import Change
 from ..write.fragments import Fragments
 from ..write.run_files import fragments
 from .epochs import select_points, select_roof
+from .ground import Ground
 from .judge import judge_building
 from .register import SurveyShift
 from .request import SIGNIFICANCE
@@ -98,7 +99,7 @@ class TileSurveys:
         steps = [self.shifts[survey] for survey in (name, other) if survey in self.shifts]
         shift = max(steps, key=lambda step: step.noise.roof, default=SurveyShift())
         verdict = judge_building(
-            roof, old, new, building.local_ground, shift.noise, shift.sigma[2], SIGNIFICANCE
+            roof, old, new, Ground.under(building), shift.noise, shift.sigma[2], SIGNIFICANCE
         )
         return verdict.change is Change.UNCHANGED
 

@@ -16,6 +16,7 @@ from ..model import Roof
 from ..status import Change
 from .cells import CellComparison, SurveyNoise, compare_points, predict_occupancy
 from .clusters import ChangedCells, find_clusters
+from .ground import Ground
 
 COVERED = 0.5
 """Share of a building that the new survey has to cover, for the building to be judged."""
@@ -60,7 +61,7 @@ def judge_building(
     roof: Roof,
     old: np.ndarray | None,
     new: np.ndarray,
-    z_ground: float,
+    ground: Ground,
     noise: SurveyNoise,
     sigma_m: float,
     significance: float,
@@ -68,14 +69,14 @@ def judge_building(
 ) -> ChangeVerdict:
     """Judge a building by its `old` and `new` points (n, 3), in its roof's frame.
 
-    Ground points inside the outline are among them. `z_ground` is the ground's height there,
-    `sigma_m` the standard deviation of the common vertical shift. Without old points clusters count
+    Ground points inside the outline are among them, `ground` is the earlier one, and `sigma_m` the
+    standard deviation of the common vertical shift. Without old points clusters count
     as far as they are larger than the area that the earlier model left unexplained.
     """
     comparison = compare_points(roof, old, new, noise)
     if is_not_covered(comparison, roof):
         return ChangeVerdict(Change.NOT_COVERED, comparison=comparison)
-    if is_gone(comparison, roof, z_ground):
+    if is_gone(comparison, roof, ground):
         return ChangeVerdict(Change.GONE, 0.0, comparison=comparison)
     whole, sigma, chance_whole = measure_whole(comparison, noise, sigma_m)
     found = [c for c in find_clusters(comparison, noise.stray) if c.area_m2 >= SMALLEST_M2]
@@ -84,7 +85,7 @@ def judge_building(
     clear = tuple(
         c
         for c in likely
-        if (c.is_surface or lies_bare(c, comparison, z_ground)) and c.area_m2 > beyond
+        if (c.is_surface or lies_bare(c, comparison, ground)) and c.area_m2 > beyond
     )
     chance = min([1.0, *(c.chance for c in clear)])
     if chance_whole < significance:
@@ -114,22 +115,22 @@ def is_not_covered(comparison: CellComparison, roof: Roof) -> bool:
     return bool(share < (COVERED / 2 if without_old else COVERED))
 
 
-def is_gone(comparison: CellComparison, roof: Roof, z_ground: float) -> bool:
+def is_gone(comparison: CellComparison, roof: Roof, ground: Ground) -> bool:
     """Return whether bare ground lies where the roof was."""
     c = comparison
     chosen = c.is_compared
     if (c.new < c.old - OVER_GROUND_M).sum() < FEWEST_COMPARED:
         return False  # hardly a building is: its heights need not be looked up
-    heights = find_heights(roof, c)
-    was_roof = chosen & (heights + c.old > z_ground + 2 * OVER_GROUND_M)
-    on_ground = was_roof & (heights + c.new < z_ground + OVER_GROUND_M)
+    heights = find_heights(roof, c) - ground.height_at(c.centres)
+    was_roof = chosen & (heights + c.old > 2 * OVER_GROUND_M)
+    on_ground = was_roof & (heights + c.new < OVER_GROUND_M)
     return int(on_ground.sum()) >= max(FEWEST_COMPARED, GONE_SHARE * int(was_roof.sum()))
 
 
-def lies_bare(cluster: ChangedCells, comparison: CellComparison, z_ground: float) -> bool:
+def lies_bare(cluster: ChangedCells, comparison: CellComparison, ground: Ground) -> bool:
     """Return whether most of a cluster's new points lie on the ground."""
-    z = comparison.points[np.isin(comparison.number, cluster.members), 2]
-    return float(np.median(z)) < z_ground + OVER_GROUND_M
+    points = comparison.points[np.isin(comparison.number, cluster.members)]
+    return float(np.median(points[:, 2] - ground.height_at(points))) < OVER_GROUND_M
 
 
 def find_heights(roof: Roof, comparison: CellComparison) -> np.ndarray:

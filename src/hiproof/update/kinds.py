@@ -16,6 +16,7 @@ from ..model import Roof
 from ..status import ChangeKind
 from .cells import MEDIAN_VARIANCE, CellComparison
 from .clusters import ChangedCells
+from .ground import Ground
 from .judge import OVER_GROUND_M, ChangeVerdict, find_heights
 from .lineage import show_parts
 
@@ -91,18 +92,19 @@ class BeforeAfter:
 
 
 def name_differences(
-    verdict: ChangeVerdict, before: Roof, after: Roof | None, z_ground: float, sigma_m: float
+    verdict: ChangeVerdict, before: Roof, after: Roof | None, ground: Ground, sigma_m: float
 ) -> list[Difference]:
     """Name what changed of a building, the largest place first.
 
     `after` is the new roof in the frame of the one `before`, None where no new roof explains the
-    points. `z_ground` is the height of the ground in that frame.
+    points. `ground` is the earlier one in that frame.
     """
     c = verdict.comparison
     if c is None:
         return []
     with np.errstate(invalid="ignore"):
-        on_ground = find_heights(before, c) + c.new < z_ground + OVER_GROUND_M
+        height = find_heights(before, c) + c.new - ground.height_at(c.centres)
+        on_ground = height < OVER_GROUND_M
     shown = show_parts(before, c.centres)
     shown_after = np.full(len(shown), -1) if after is None else show_parts(after, c.centres)
     sides = BeforeAfter(c, before, after, shown, shown_after, on_ground, sigma_m)

@@ -25,6 +25,7 @@ from ..stages.remarks import add_finding
 from ..status import Change, Doubt, Status
 from .cells import MEDIAN_VARIANCE, CellComparison
 from .epochs import Surveys
+from .ground import Ground
 from .judge import FEWEST_COMPARED, OVER_GROUND_M, ChangeVerdict, judge_building, lies_bare
 from .lineage import lift_part, measure_lift, show_parts, unite_lifts
 from .places import move_to_frame
@@ -67,7 +68,7 @@ def move_building(
         result.roof,
         old,
         points[1],
-        earlier.local_ground,
+        Ground.under(earlier),
         surveys.shift.noise,
         surveys.shift.sigma[2],
         surveys.largest_chance,
@@ -141,19 +142,20 @@ class LostParts:
     earlier: Roof
 
     @classmethod
-    def find(cls, verdict: ChangeVerdict, earlier: Roof, z_ground: float) -> LostParts | None:
+    def find(cls, verdict: ChangeVerdict, earlier: Roof, ground: Ground) -> LostParts | None:
         """Find the places that a verdict calls changed and where the ground lies bare.
 
-        `z_ground` is its height in the frame of the earlier roof. None where there are none.
+        `ground` is the earlier one in the frame of the roof. None where there are none.
         """
         c = verdict.comparison
         if c is None:
             return None
-        bare = [cluster for cluster in verdict.clusters if lies_bare(cluster, c, z_ground)]
+        bare = [cluster for cluster in verdict.clusters if lies_bare(cluster, c, ground)]
         if not bare:
             return None
         places = c.centres[np.concatenate([cluster.members for cluster in bare])]
-        is_low, xy = c.points[:, 2] < z_ground + OVER_GROUND_M, c.points[:, :2]
+        is_low = c.points[:, 2] - ground.height_at(c.points) < OVER_GROUND_M
+        xy = c.points[:, :2]
         area_m2 = sum(cluster.area_m2 for cluster in bare)
         return cls(places, area_m2, xy[~is_low], xy[is_low], earlier)
 

@@ -18,6 +18,7 @@ from ..parametric.building import build
 from ..status import ChangeKind, Status
 from ..write.parameters import outline_record
 from .cells import measure_residuals
+from .ground import Ground
 from .judge import OVER_GROUND_M, ChangeVerdict
 from .kinds import Difference
 
@@ -33,29 +34,30 @@ NEAR_M, WELL_SHARE = 0.2, 0.6
 new roof has to explain: of usual roofs nine in ten are."""
 
 
-def explains(new: Roof, old: Roof, verdict: ChangeVerdict, z_ground: float) -> bool:
+def explains(new: Roof, old: Roof, verdict: ChangeVerdict, ground: Ground) -> bool:
     """Return whether the new roof explains the new points better, and well.
 
-    It has to explain points that contradict the earlier one. Both roofs are in one frame, in which
-    the ground has the height `z_ground`.
+    It has to explain points that contradict the earlier one. Both roofs and the `ground`
+    are in one frame.
     """
     c = verdict.comparison
     if c is None:
         return False
     members = [cluster.members for cluster in verdict.clusters]
     chosen = np.isin(c.number, np.concatenate(members)) if members else c.number >= 0
-    is_near = [measure_distances(roof, c.points, z_ground) <= NEAR_M for roof in (new, old)]
+    is_near = [measure_distances(roof, c.points, ground) <= NEAR_M for roof in (new, old)]
     share, share_before = (float(np.mean(near[chosen])) for near in is_near)
     return share >= max(BETTER_SHARE, share_before) and float(np.mean(is_near[0])) >= WELL_SHARE
 
 
-def measure_distances(roof: Roof, points: np.ndarray, z_ground: float) -> np.ndarray:
+def measure_distances(roof: Roof, points: np.ndarray, ground: Ground) -> np.ndarray:
     """Return the vertical distances (n,) of points (n, 3) from a roof.
 
     Beside the roof they are those from the ground: points on it have none.
     """
     result = np.abs(measure_residuals(roof, points))
-    beside = np.where(points[:, 2] < z_ground + OVER_GROUND_M, 0.0, np.inf)
+    is_low = points[:, 2] - ground.height_at(points) < OVER_GROUND_M
+    beside = np.where(is_low, 0.0, np.inf)
     return np.where(np.isfinite(result), result, beside)
 
 

@@ -38,6 +38,7 @@ from ..write.fragments import Fragments
 from ..write.run_files import fragments
 from .cells import SAME_SIGMAS
 from .epochs import JUDGING_FILE, SURVEYS_FILE, Epochs, Surveys, select_roof
+from .ground import Ground
 from .judge import ChangeVerdict, judge_building
 from .kinds import Difference, name_differences, name_doubts
 from .lineage import continue_parts
@@ -156,7 +157,7 @@ class Updater:
         lines = tuple(read_terrain_lines(member.record))
         earlier = dataclasses.replace(earlier, terrain_intersection=lines)
         earlier = with_model(earlier, roof, self.plan.settings.compose)
-        lost = LostParts.find(verdict, roof, earlier.local_ground)
+        lost = LostParts.find(verdict, roof, Ground.under(earlier))
         result = self.follow_verdict(job, member, earlier, verdict, lost)
         places = record_places(unseen, roof.frame)
         if places and result is earlier:
@@ -174,11 +175,15 @@ class Updater:
         old, new = self.epochs.select(job, record)
         frame, shift = roof.frame, self.surveys.shift
         unexplained = earlier.quality.unexplained_area_m2
+
+        def read_lines() -> list[np.ndarray]:
+            return [frame.to_local(line) for line in read_terrain_lines(record)]
+
         return judge_building(
             roof,
             None if old is None else frame.to_local(old),
             frame.to_local(new),
-            earlier.z_ground - frame.origin[2],
+            Ground(earlier.z_ground - frame.origin[2], read_lines),
             shift.noise,
             shift.sigma[2],
             self.surveys.largest_chance,
@@ -257,7 +262,7 @@ class Updater:
             return self.mark(moved, verdict, places, member, list(range(len(moved.parts))))
         new = self.reconstruct(job, member, lost)
         if new.built is None or not explains(
-            move_to_frame(new.roof, earlier.roof), earlier.roof, verdict, earlier.local_ground
+            move_to_frame(new.roof, earlier.roof), earlier.roof, verdict, Ground.under(earlier)
         ):
             places = self.name_places(earlier, None, verdict)
             if {place["kind"] for place in places} == {ChangeKind.PART_REMOVED.code}:
@@ -295,8 +300,8 @@ class Updater:
         `result` is its new model, None where no new model explains the points.
         """
         roof = None if result is None else move_to_frame(result.roof, earlier.roof)
-        sigma, z_ground = self.surveys.shift.sigma[2], earlier.local_ground
-        found = name_differences(verdict, earlier.roof, roof, z_ground, sigma)
+        sigma, ground = self.surveys.shift.sigma[2], Ground.under(earlier)
+        found = name_differences(verdict, earlier.roof, roof, ground, sigma)
         return record_places(found, earlier.roof.frame)
 
     def redraw(
