@@ -39,10 +39,15 @@ def sample_roof(name, theta, density=5.0, noise_m=0.05, outlier_share=0.0, seed=
     return points
 
 
+def scatter(outline, rng, density=8.0):
+    """Places (n, 2) at random in `outline`, `density` a square metre."""
+    x0, y0, x1, y1 = outline.bounds
+    xy = rng.uniform((x0, y0), (x1, y1), (int(density * (x1 - x0) * (y1 - y0)), 2))
+    return xy[shapely.contains_xy(outline, *xy.T)]
+
+
 def sample_heights(height, outline, density=8.0, noise=0.03, seed=0):
     """Points (n, 3) at random over `outline` on the surface `height(x, y)`."""
     rng = np.random.default_rng(seed)
-    x0, y0, x1, y1 = outline.bounds
-    xy = rng.uniform((x0, y0), (x1, y1), (int(density * (x1 - x0) * (y1 - y0)), 2))
-    xy = xy[shapely.contains_xy(outline, xy[:, 0], xy[:, 1])]
+    xy = scatter(outline, rng, density)
     return np.column_stack([xy, height(xy[:, 0], xy[:, 1]) + rng.normal(0.0, noise, len(xy))])

@@ -10,6 +10,7 @@ from hiproof import reconstruct
 from hiproof.city.plan.work_plan import AROUND_M as PLANNED_AROUND_M
 from hiproof.fit.align import AROUND_M, find_shift
 from hiproof.settings import Settings
+from points_of_roofs import scatter
 
 L_SHAPE = shapely.Polygon([(0, 0), (16, 0), (16, 8), (7, 8), (7, 14), (0, 14)])
 OFF = Settings.from_dict({"reconstruct": {"align": "off"}})
@@ -18,9 +19,7 @@ OFF = Settings.from_dict({"reconstruct": {"align": "off"}})
 def points_in(outline, density=5.0, seed=0, noise_m=0.05):
     """Points (n, 3) of a gable over the outline's box, spread by chance over the outline."""
     rng = np.random.default_rng(seed)
-    x0, y0, x1, y1 = outline.bounds
-    xy = rng.uniform((x0, y0), (x1, y1), (int(density * (x1 - x0) * (y1 - y0)), 2))
-    xy = xy[shapely.contains_xy(outline, xy[:, 0], xy[:, 1])] + 0.0
+    xy, (_, y0, _, y1) = scatter(outline, rng, density), outline.bounds
     z = 8.0 - 0.6 * np.abs(xy[:, 1] - 0.5 * (y0 + y1))
     return np.column_stack([xy + rng.normal(0.0, noise_m, xy.shape), z])
 

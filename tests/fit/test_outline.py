@@ -46,6 +46,7 @@ from hiproof.fit.outline.soft import SURE_BLURS
 from hiproof.fit.outline.spread import unevenness
 from hiproof.fit.outline.steps import RUN, add_steps, best_levels
 from hiproof.fit.walls import on_walls
+from points_of_roofs import scatter
 
 ANYWHERE = (-np.inf, np.inf, -np.inf, np.inf)
 L_SHAPE = shapely.Polygon([(0, 0), (16, 0), (16, 8), (7, 8), (7, 18), (0, 18)])
@@ -57,12 +58,14 @@ SHAPES = {
 
 
 def points_in(outline, density, angle=0.3, seed=0):
-    rng = np.random.default_rng(seed)
-    x0, y0, x1, y1 = outline.bounds
-    xy = rng.uniform((x0, y0), (x1, y1), (int(density * (x1 - x0) * (y1 - y0)), 2))
-    xy = xy[shapely.contains_xy(outline, xy[:, 0], xy[:, 1])]
+    xy = scatter(outline, np.random.default_rng(seed), density)
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     return xy @ turn.T, shapely.transform(outline, lambda c: c @ turn.T)
+
+
+def make_border(points, density, court, *prices):
+    """The border of points (x, y, whether of a wall), with what corners and lines cost."""
+    return Border(*points, density, court, ANYWHERE, 0.15, costs_by_depth(0.02), *prices)
 
 
 def count_corners(outline):
@@ -201,20 +204,8 @@ def test_a_bay_drawn_as_a_wedge_becomes_one_with_right_angles():
     truth = shapely.box(0, 0, 14, 8) - shapely.box(5, 6.5, 8, 8)
     x, y = points_in(truth, 8.0, angle=0.0)[0].T
     order = np.argsort(y)
-    border = Border(
-        x[order],
-        y[order],
-        np.zeros(len(x), bool),
-        8.0,
-        False,
-        ANYWHERE,
-        0.15,
-        costs_by_depth(0.02),
-        3.0,
-        3.0,
-        1.0,
-        6.0,
-    )
+    points = x[order], y[order], np.zeros(len(x), bool)
+    border = make_border(points, 8.0, False, 3.0, 3.0, 1.0, 6.0)
     wedge = [(0, 0), (14, 0), (14, 8), (8.5, 8), (6.5, 6), (4.5, 8), (0, 8)]
     drawing = make_drawing(make_lines(np.array(wedge, float)), 0.0, border)
     assert len(add_steps(drawing, border, 1).lines) == 7  # no matter of single sides
@@ -312,20 +303,8 @@ def test_points_of_chance_are_as_uneven_as_chance_and_rows_are_less():
 def test_a_change_is_drawn_and_priced_as_if_all_were_drawn_anew(court):
     rng = np.random.default_rng(3)
     x, y = rng.uniform(0, 10, (2, 300))
-    border = Border(
-        x,
-        np.sort(y),
-        rng.random(300) < 0.3,
-        3.0,
-        court,
-        ANYWHERE,
-        0.15,
-        costs_by_depth(0.02),
-        2.5,
-        3.0,
-        1.0,
-        6.0,
-    )
+    points = x, np.sort(y), rng.random(300) < 0.3
+    border = make_border(points, 3.0, court, 2.5, 3.0, 1.0, 6.0)
     ring = np.array([(0, 0), (9.8, 0.4), (9.5, 6), (4, 6.2), (4.1, 10), (0, 9.7)], float)
     lines = make_lines(ring[::-1] if court else ring)
     drawing = make_drawing(lines, 0.0, border)
@@ -337,29 +316,16 @@ def test_a_change_is_drawn_and_priced_as_if_all_were_drawn_anew(court):
         changes = [(replace_lines(lines, i, 1, lines[i, 0] + 0.05, lines[i, 1] + 0.3), 2)]
         changes += [(drop_line(lines, i), 1), (replaced_by(lines, i, 1, notch), 4)]
         for new, expected in changes:
-            result, redrawn = (
-                apply_change(new, drawing, i, 1, expected, border),
-                make_drawing(new, 0.0, border),
-            )
-            assert evaluate_change(new, drawing, i, 1, expected, border, np.inf) == pytest.approx(
-                result.cost
-            )
+            change = new, drawing, i, 1, expected, border
+            result, redrawn = apply_change(*change), make_drawing(new, 0.0, border)
+            assert evaluate_change(*change, np.inf) == pytest.approx(result.cost)
             if np.isfinite(redrawn.cost):
-                assert (
-                    evaluate_change(new, drawing, i, 1, expected, border, result.cost - 1e-6)
-                    == np.inf
-                )
-                assert (
-                    evaluate_change(new, drawing, i, 1, expected, border, result.cost + 1e-6)
-                    < np.inf
-                )
-                assert (
-                    result.cost == pytest.approx(redrawn.cost)
-                    and result.structure == redrawn.structure
-                )
-                assert result.own == pytest.approx(redrawn.own) and result.corners == pytest.approx(
-                    redrawn.corners
-                )
+                assert evaluate_change(*change, result.cost - 1e-6) == np.inf
+                assert evaluate_change(*change, result.cost + 1e-6) < np.inf
+                assert result.cost == pytest.approx(redrawn.cost)
+                assert result.structure == redrawn.structure
+                assert result.own == pytest.approx(redrawn.own)
+                assert result.corners == pytest.approx(redrawn.corners)
                 priced += 1
     assert priced >= 12
 
@@ -375,9 +341,7 @@ def test_what_points_cost_is_looked_up_as_it_is_computed(wall):
 
 
 def test_lines_skew_ones_directions_and_sharp_corners_have_their_prices():
-    border = Border(
-        *np.zeros((3, 0)), 3.0, False, ANYWHERE, 0.15, costs_by_depth(0.02), 3.0, 5.0, 1.0, 7.0
-    )
+    border = make_border(np.zeros((3, 0)), 3.0, False, 3.0, 5.0, 1.0, 7.0)
     rings = {"square": [(0, 0), (8, 0), (8, 6), (0, 6)], "wedge": [(0, 0), (12, 0), (0, 5)]}
     rings |= {"slant": [(0, 0), (9, 0), (7, 6), (-2, 6)]}
     costs = {

@@ -123,16 +123,6 @@ def test_fewer_than_four_points_give_a_flat_roof_at_their_median():
     assert fit.roof_parts[0].pieces[0].planes[0] == pytest.approx([0.0, 0.0, 5.0])
 
 
-def test_the_order_of_the_points_does_not_matter():
-    points = sample_heights(gable_with_shed, HOUSE)
-    shuffled = points[np.random.default_rng(1).permutation(len(points))]
-    first, other = fit_building(points, HOUSE), fit_building(shuffled, HOUSE)
-    assert first.objective == other.objective
-    for part, twin in zip(first.roof_parts, other.roof_parts, strict=True):
-        assert part.pieces[0].outline.equals(twin.pieces[0].outline)
-        assert (part.pieces[0].planes == twin.pieces[0].planes).all()
-
-
 def test_points_outside_the_outline_do_not_count():
     points = sample_heights(gable_with_shed, HOUSE)
     neighbours = sample_heights(lambda x, y: 20.0 + 0.0 * x, shapely.box(12.5, 0, 20, 7))
@@ -140,25 +130,6 @@ def test_points_outside_the_outline_do_not_count():
         fit_building(np.vstack([points, neighbours]), HOUSE).objective
         == fit_building(points, HOUSE).objective
     )
-
-
-def test_the_roof_moves_with_its_points():
-    points, shift = sample_heights(gable_with_shed, HOUSE), np.array([103.0, -57.0, 12.0])
-    moved = fit_building(points + shift, shapely.transform(HOUSE, lambda xy: xy + shift[:2]))
-    original = measure_height(fit_building(points, HOUSE), points[:, :2])
-    assert measure_height(moved, points[:, :2] + shift[:2]) == pytest.approx(
-        original + shift[2], abs=1e-3
-    )
-
-
-def test_the_roof_turns_with_its_points():
-    points = sample_heights(gable_with_shed, HOUSE)
-    cos, sin = np.cos(0.4), np.sin(0.4)
-    turn = np.array([[cos, -sin], [sin, cos]])
-    turned = np.column_stack([points[:, :2] @ turn.T, points[:, 2]])
-    fit = fit_building(turned, shapely.transform(HOUSE, lambda xy: xy @ turn.T))
-    original = measure_height(fit_building(points, HOUSE), points[:, :2])
-    assert np.mean(np.abs(measure_height(fit, turned[:, :2]) - original) < 0.05) > 0.97
 
 
 def test_one_unseen_side_of_a_gable_grows_no_spike():
@@ -233,13 +204,6 @@ def test_parts_are_named_by_the_catalogue_with_parameters_and_deviations():
     assert parts["flat"].translation[2] == pytest.approx(3.0, abs=0.02)
 
 
-def test_equal_monopitches_in_a_row_are_one_saw_tooth():
-    hall = shapely.box(0, 0, 12, 15)
-    fit = fit_building(sample_heights(lambda x, y: 4.0 + 0.5 * (y % 5.0), hall), hall)
-    assert [part.type for part in fit.roof_parts] == ["shed"]
-    assert fit.roof_parts[0].parameters["teeth"] == 3
-
-
 def tooth_edges(fit):
     """Where the teeth of a hall end along y."""
     bounds = [piece.outline.bounds for part in fit.roof_parts for piece in part.pieces]
@@ -252,6 +216,7 @@ def test_teeth_are_equally_wide_however_the_points_beside_a_step_lie():
     points[:, :2] += np.random.default_rng(1).normal(0.0, 0.05, (len(points), 2))
     fit = fit_building(points, hall)
     assert [part.type for part in fit.roof_parts] == ["shed"]
+    assert fit.roof_parts[0].parameters["teeth"] == 3
     assert tooth_edges(fit) == pytest.approx([0.0, 5.0, 10.0, 15.0], abs=1e-3)
 
 
@@ -297,9 +262,3 @@ def test_without_an_outline_the_plan_is_estimated():
     fit = fit_building(points)
     assert iou(fit.outline, HOUSE) > 0.9
     assert fit.unexplained < 0.1
-
-
-def test_points_on_a_line_without_an_outline_are_an_error_with_a_sentence():
-    line = np.column_stack([np.arange(9.0), np.arange(9.0), np.full(9, 4.0)])
-    with pytest.raises(FitError, match="expected points that span an area"):
-        fit_building(line)

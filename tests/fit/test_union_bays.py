@@ -6,6 +6,7 @@ import shapely
 from shapely import box
 
 from hiproof.fit.roof import fit_building
+from points_of_roofs import scatter
 
 HOUSE = box(0, 0, 16, 12)
 BUMPS = {
@@ -18,9 +19,7 @@ BUMPS = {
 
 def scan_roof(rng, outline, height, density=5.0):
     """Return points (n, 3) at random over `outline`, on a roof of this `height`."""
-    lower, upper = np.array(outline.bounds[:2]), np.array(outline.bounds[2:])
-    xy = rng.uniform(lower, upper, (int(density * np.prod(upper - lower)), 2))
-    xy = xy[shapely.contains_xy(outline, *xy.T)]
+    xy = scatter(outline, rng, density)
     return np.column_stack([xy, height(*xy.T) + rng.normal(0.0, 0.02, len(xy))])
 
 

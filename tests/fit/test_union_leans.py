@@ -13,6 +13,7 @@ from hiproof.fit.union.objective import compute_objective
 from hiproof.fit.union.scene import MOST_WALL_LEAN, find_leans
 from hiproof.fit.union.volumes import LEAN0, N_SIDES, OFFSET0, find_lowest_plane, read_coefficients
 from hiproof.model import Roof
+from points_of_roofs import scatter
 from roof_zoo import FRAME
 from union_scenes import draw_scene, draw_volumes
 
@@ -31,9 +32,7 @@ def scan_wedge(skew, pitch, rng, density=6.0):
     The eaves are 5 m high, the noise is 2 cm.
     """
     outline = make_wedge(skew)
-    x0, y0, x1, y1 = outline.bounds
-    xy = rng.uniform((x0, y0), (x1, y1), (int(density * (x1 - x0) * (y1 - y0)), 2))
-    xy = xy[shapely.contains_xy(outline, *xy.T)]
+    xy = scatter(outline, rng, density)
     inwards = [(s * xy[:, 1] + 4 - skew * xy[:, 0]) / math.hypot(1.0, skew) for s in (1.0, -1.0)]
     z = 5.0 + pitch * np.minimum(*inwards)
     return outline, np.column_stack([xy, z + rng.normal(0.0, 0.02, len(xy))]), z

@@ -116,9 +116,10 @@ def test_equal_monopitches_in_a_row_are_one_saw_tooth(count, kappa):
     assert np.mean(np.abs(measure_height([shed], xy) - measure_height(parts, xy)) < 1e-6) > 0.99
 
 
+@pytest.mark.parametrize("number", [1, 2])
 @pytest.mark.parametrize("kappa", KAPPAS)
-def test_a_tooth_whose_lower_end_is_hidden_is_a_tooth_of_its_row(kappa):
-    """The middle one of three reaches under its neighbour.
+def test_a_tooth_whose_lower_end_is_hidden_is_a_tooth_of_its_row(kappa, number):
+    """The middle one of three, or the last, reaches under its neighbour.
 
     Neither of the others follows the other.
     """
@@ -127,12 +128,12 @@ def test_a_tooth_whose_lower_end_is_hidden_is_a_tooth_of_its_row(kappa):
         key=lambda part: np.array([-math.sin(kappa), math.cos(kappa)]) @ part.translation[:2],
     )
     shape, back = get("monopitch"), np.array([math.sin(kappa), -math.cos(kappa), 0.0])
-    middle = parts[1]
+    tooth, row = parts[number], list(parts)
     longer = {"width": 8.0, "length": 12.0, "height": 4.0}  # 3 m of it under the first tooth
-    lowered = shape.part(
-        shape.to_theta(longer, kappa, middle.translation + 1.5 * back + [0.0, 0.0, -1.5])
+    row[number] = shape.part(
+        shape.to_theta(longer, kappa, tooth.translation + 1.5 * back + [0.0, 0.0, -1.5])
     )
-    (shed,) = combine_parts([parts[0], lowered, parts[2]])
+    (shed,) = combine_parts(row)
     assert shed.type == "shed" and shed.parameters["teeth"] == 3
     xy = scatter_points(parts)
     assert np.mean(np.abs(measure_height([shed], xy) - measure_height(parts, xy)) < 1e-6) > 0.99

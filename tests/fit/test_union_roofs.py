@@ -11,17 +11,16 @@ from benchmarks.matching import has_hidden_end, list_right_types, merge_alike
 from hiproof.compose import check_solid, compose
 from hiproof.fit.roof import fit_building
 from hiproof.fit.roof.parts import REGISTERED_M, REGISTERED_PLAN_M
-from hiproof.fit.shapes.composite import combine_parts
 from hiproof.model import Roof
 from hiproof.primitives import CATALOGUE, get
 from hiproof.primitives.family import COMPONENTS, GENERAL_SHAPES, compute_planes
 from hiproof.settings import Settings
 from hiproof.simulate import COMPOUND_KINDS, ScanSettings, random_building, random_compound, scan
 from hiproof.simulate.scene import Defects
+from points_of_roofs import scatter
 from roof_zoo import FRAME
 from union_scenes import compute_lowest, draw_member, list_corners
 
-DENSITY = 8.0
 WINGED = [(kind, type) for kind in ("L", "T", "U", "cross") for type in ("gable", "hip")]
 # Slopes on some sides beside a level top are told as two parts now and then.
 SPLIT = (
@@ -29,13 +28,6 @@ SPLIT = (
     "corner_mansard",
 )
 DEAD_M = 0.06  # what residuals may be without a cost: slopes that differ by less are told as equal
-
-
-def scatter(outline, rng, density=DENSITY):
-    """Return places (n, 2) at random in `outline`, `density` a square metre."""
-    x0, y0, x1, y1 = outline.bounds
-    xy = rng.uniform((x0, y0), (x1, y1), (int(density * (x1 - x0) * (y1 - y0)), 2))
-    return xy[shapely.contains_xy(outline, *xy.T)]
 
 
 def measure_height(fit, xy):
@@ -337,37 +329,11 @@ def test_parts_have_the_types_asked_for_or_are_flat(types):
         assert fit.unexplained == pytest.approx(np.mean(is_far), abs=0.05)
 
 
-def test_a_hip_that_may_only_be_a_gable_is_no_hip_of_that_name():
-    _, xy, z, _ = fit_member("hip", 0)
-    fit = fit_building(
-        np.column_stack([xy, z]),
-        fit_member("hip", 0)[3].outline,
-        Settings.from_dict({"fit": {"types": ["gable"]}}),
-    )
-    assert {part.type for part in fit.roof_parts} <= {"gable", "flat"}
-
-
 def test_components_and_names_belong_together():
     assert all(
         get(name).name == name and set(parts) <= set(CATALOGUE)
         for name, parts in COMPONENTS.items()
     )
-
-
-def test_a_tooth_with_something_more_is_a_tooth():
-    """A cut corner or a rectangle that continues under the next tooth ends no row."""
-    outline = shapely.box(0, 0, 20, 10)
-    tooth = {"width": 5.0, "length": 10.0, "height": 2.0}
-    centres = [np.array([2.5 + 5.0 * k, 5.0, 6.0]) for k in range(4)]
-    shape = get("monopitch")
-    row = [shape.part(shape.to_theta(tooth, -0.5 * math.pi, centre)) for centre in centres]
-    wide = {"width": 9.0, "length": 10.0, "height": 3.6}
-    row[3] = shape.part(shape.to_theta(wide, -0.5 * math.pi, centres[3] - [2.0, 0.0, 1.6]))
-    (result,) = combine_parts(row)
-    assert result.type == "shed" and result.parameters["teeth"] == 4
-    xy = scatter(outline.buffer(-0.3), np.random.default_rng(0))
-    original = np.max([part.height_at(xy) for part in row], axis=0)
-    assert np.mean(np.abs(result.height_at(xy) - original) < 0.05) > 0.95
 
 
 @pytest.mark.parametrize("kind, seed", [("row", 3), ("row", 11), ("row", 19), ("L_of_hips", 1)])

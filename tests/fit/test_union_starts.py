@@ -15,6 +15,7 @@ from hiproof.fit.union.plan import lay_out_plan, measure_emptiness
 from hiproof.fit.union.planes import Cloud
 from hiproof.fit.union.scene import find_directions, make_scene
 from hiproof.model import Roof
+from points_of_roofs import scatter
 from roof_zoo import FRAME
 from union_scenes import draw_scene, draw_volumes
 
@@ -24,10 +25,7 @@ U_SHAPE = shapely.Polygon([(0, 0), (20, 0), (20, 14), (14, 14), (14, 6), (6, 6),
 
 def make_scene_over(outline, density=4.0):
     """Return the scene of level points scattered over `outline`."""
-    rng = np.random.default_rng(0)
-    x0, y0, x1, y1 = outline.bounds
-    xy = rng.uniform((x0, y0), (x1, y1), (int(density * (x1 - x0) * (y1 - y0)), 2))
-    xy = xy[shapely.contains_xy(outline, *xy.T)]
+    xy = scatter(outline, np.random.default_rng(0), density)
     plan = lay_out_plan(np.column_stack([xy, np.zeros(len(xy))]), outline)
     return plan, make_scene(
         plan, outline, find_directions(outline, plan), 1.0, 0.25, list_allowed_shapes(())
@@ -62,10 +60,7 @@ def test_growing_anew_never_costs(seed):
 
 
 def scatter_points(outline, density):
-    rng = np.random.default_rng(1)
-    x0, y0, x1, y1 = outline.bounds
-    xy = rng.uniform((x0, y0), (x1, y1), (int(density * (x1 - x0) * (y1 - y0)), 2))
-    return xy[shapely.contains_xy(outline, *xy.T)]
+    return scatter(outline, np.random.default_rng(1), density)
 
 
 def test_a_gable_over_walls_that_are_not_parallel_is_one_part():
