@@ -6,7 +6,6 @@ import dataclasses
 import re
 
 import numpy as np
-import pyogrio
 import pytest
 import shapely
 from click.testing import CliRunner
@@ -20,6 +19,7 @@ from hiproof.cli.reconstruct import find_settings_file
 from hiproof.errors import InputError, SettingsError
 from hiproof.read.outlines.footprints import read_footprints
 from hiproof.settings import Settings
+from layers import write_layer
 from run_records import by_id
 from tiny_town import write_cloud
 
@@ -31,13 +31,8 @@ HOUSES = {f"house-{i}": shapely.box(20 * i, 0, 20 * i + 10, 8) for i in range(5)
 @pytest.fixture
 def houses(tmp_path):
     """A file of five houses in a row, each with a year and a name."""
-    geometry = shapely.to_wkb(list(HOUSES.values()))
-    columns = [np.array(list(HOUSES), object), np.arange(1900, 1950, 10)]
-    path = tmp_path / "houses.gpkg"
-    pyogrio.raw.write(
-        path, geometry, columns, ["id", "year"], geometry_type="Polygon", crs="EPSG:28992"
-    )
-    return path
+    columns = {"id": list(HOUSES), "year": np.arange(1900, 1950, 10)}
+    return write_layer(tmp_path / "houses.gpkg", HOUSES.values(), columns)
 
 
 @pytest.mark.parametrize(
@@ -116,15 +111,7 @@ def test_a_box_is_in_the_coordinates_of_the_clouds(houses):
     """Whatever the footprints are in: the same houses, though their coordinates are others."""
     distant_corner = (155000.0, 463000.0)
     moved = shapely.transform(list(HOUSES.values()), lambda xy: xy + distant_corner)
-    path = houses.with_name("moved.gpkg")
-    pyogrio.raw.write(
-        path,
-        shapely.to_wkb(moved),
-        [np.array(list(HOUSES), object)],
-        ["id"],
-        geometry_type="Polygon",
-        crs="EPSG:28992",
-    )
+    path = write_layer(houses.with_name("moved.gpkg"), moved, {"id": list(HOUSES)})
     footprints = read_footprints(path, target_crs="EPSG:32631")
     box = tuple(footprints[2].polygon.buffer(1.0).bounds)
     assert [f.id for f in read_footprints(path, target_crs="EPSG:32631", bbox=box)] == ["house-2"]
@@ -148,17 +135,8 @@ def test_a_choice_that_leaves_nothing_gets_a_sentence(options, message, houses):
 
 
 @pytest.mark.parametrize("ending", ["geojson", "shp", "fgb"])
-def test_a_condition_that_no_database_reads_gets_the_same_sentence(ending, houses, tmp_path):
-    path = tmp_path / f"houses.{ending}"
-    geometry = pyogrio.raw.read(houses)[2]
-    pyogrio.raw.write(
-        path,
-        geometry,
-        [np.arange(len(geometry))],
-        ["year"],
-        geometry_type="Polygon",
-        crs="EPSG:28992",
-    )
+def test_a_condition_that_no_database_reads_gets_the_same_sentence(ending, tmp_path):
+    path = write_layer(tmp_path / f"houses.{ending}", HOUSES.values(), {"year": np.arange(5)})
     with pytest.raises(
         InputError, match=r"--where in SQL on the attributes of .*\(year\), got: 'height > 3'"
     ):

@@ -7,15 +7,13 @@ import pytest
 import shapely
 
 import hiproof
-from hiproof import read_parameters
-from hiproof.city.run import Request, reconstruct_area
 from hiproof.compose import check_solid
 from hiproof.edit.folder import measure_doubt
 from hiproof.errors import InputWarning
 from hiproof.settings import Settings
 from hiproof.status import Doubt, Status
-from run_records import by_id
-from tiny_town import ORIGIN, make_town, write_cloud, write_footprints
+from run_records import run_points
+from tiny_town import ORIGIN, make_town
 
 X, Y = ORIGIN[:2]
 HOUSE, YARD = shapely.box(X, Y, X + 16, Y + 12), shapely.box(X + 9, Y, X + 16, Y + 6)
@@ -35,14 +33,9 @@ def scan(has_house=True, density=6.0, seed=0):
 
 def run(folder, xyz, classes, **settings):
     """The only building, as `folder` has it after a run, and the run's summary."""
-    folder.mkdir(exist_ok=True)
-    cloud = write_cloud(folder / "cloud.laz", xyz, classes)
-    footprints = write_footprints(folder / "footprints.geojson", {"a": HOUSE})
-    roof_indices = Settings.from_dict({"reconstruct": settings})
-    summary = reconstruct_area(
-        Request((str(cloud),), folder / "out", str(footprints), settings=roof_indices)
-    )
-    return by_id(folder / "out")["a"], summary
+    settings = Settings.from_dict({"reconstruct": settings})
+    rows, summary = run_points(folder, xyz, classes, {"a": HOUSE}, settings=settings)
+    return rows["a"], summary
 
 
 def volume(record):
@@ -160,12 +153,6 @@ def test_a_low_shed_stands(height):
 def test_an_override_says_that_a_building_stands(tmp_path):
     (tmp_path / "o.jsonl").write_text('{"id": "a", "type": "flat"}')
     xyz, classes = add_heaps(*scan(has_house=False), 6)
-    cloud = write_cloud(tmp_path / "cloud.laz", xyz, classes)
-    footprints = write_footprints(tmp_path / "footprints.geojson", {"a": HOUSE})
-    reconstruct_area(
-        Request(
-            (str(cloud),), tmp_path / "out", str(footprints), overrides=str(tmp_path / "o.jsonl")
-        )
-    )
-    (row,) = read_parameters(tmp_path / "out" / "parameters.jsonl")
+    overrides = str(tmp_path / "o.jsonl")
+    row = run_points(tmp_path, xyz, classes, {"a": HOUSE}, overrides=overrides)[0]["a"]
     assert row["parts"] and "overridden: type flat" in row["detail"]

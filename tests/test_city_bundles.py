@@ -21,6 +21,7 @@ from hiproof.city.work.solve import reconstruct
 from hiproof.cli.app import app
 from hiproof.errors import InputError
 from hiproof.settings import Settings
+from layers import write_layer, write_raster
 from run_records import by_id, records
 from tiny_town import CRS, make_town, write_cloud, write_footprints, write_town
 
@@ -93,19 +94,12 @@ def test_a_bundle_repeats_the_failure_to_the_last_digit(
 
 
 def test_a_bundle_holds_the_terrain_where_it_was_asked(tmp_path, set_failing_ids):
-    rasterio = pytest.importorskip(
-        "rasterio", reason="terrain models need rasterio (extra `terrain`)"
-    )
+    pytest.importorskip("rasterio", reason="terrain models need rasterio (extra `terrain`)")
     town = make_town(2, density=3.0)
     cloud, footprints = map(str, write_town(tmp_path, town))
     x, y = np.floor(town.xyz[:, :2].min(axis=0)) - 50.0
     heights = np.add.outer(np.linspace(3, 1, 150), np.linspace(0, 0.9, 190)).astype(np.float32)
-    shape = {"height": 150, "width": 190, "count": 1, "dtype": "float32", "crs": CRS}
-    terrain = str(tmp_path / "dtm.tif")
-    with rasterio.open(
-        terrain, "w", "GTiff", transform=rasterio.transform.from_origin(x, y + 150, 1, 1), **shape
-    ) as file:
-        file.write(heights, 1)
+    terrain = write_raster(tmp_path / "dtm.tif", heights, x, y + 150, crs=CRS)
     request = Request((cloud,), tmp_path / "out", footprints, terrain, restart=True)
     reconstruct_area(request)
     expected = read_solved_rows(request.out)["house-1"]
@@ -131,17 +125,9 @@ def test_a_bundle_holds_the_terrain_where_it_was_asked(tmp_path, set_failing_ids
 def test_a_bundle_has_no_attributes_and_its_files_open_anywhere(tmp_path, set_failing_ids):
     town = make_town(1)
     cloud = write_cloud(tmp_path / "cloud.laz", town.xyz, town.classification)
-    footprints = tmp_path / "footprints.gpkg"
     (outline,) = town.footprints.values()
-    fields = [np.array(["a"], object), np.array([SECRET], object)]
-    pyogrio.raw.write(
-        footprints,
-        shapely.to_wkb([outline]),
-        fields,
-        ["id", "owner"],
-        geometry_type="Polygon",
-        crs="EPSG:28992",
-    )
+    columns = {"id": ["a"], "owner": [SECRET]}
+    footprints = write_layer(tmp_path / "footprints.gpkg", [outline], columns)
     set_failing_ids("a")
     reconstruct_area(Request((str(cloud),), tmp_path / "out", str(footprints)))
     (bundle,) = bundles.bundles_in(tmp_path / "out")

@@ -10,23 +10,20 @@ import numpy as np
 import pytest
 import shapely
 
-from hiproof import build, read_parameters
+from hiproof import build
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.city.work.found import found_roof
 from hiproof.errors import InputError, InputWarning
 from hiproof.settings import Settings
 from hiproof.simulate import SOURCES, Defects, ScanSettings, random_compound, scan
 from leafy_scenes import drone, forest, make_house_under_tree
+from run_records import by_id, run_points
 from tiny_town import make_town, write_cloud, write_footprints
 
 
 def run(folder, xyz, classes, footprints=None, settings=None):
-    """The run's record and its rows by id."""
-    cloud = write_cloud(folder / "cloud.laz", xyz, classes, origin=xyz.min(axis=0))
-    outlines = footprints and str(write_footprints(folder / "footprints.geojson", footprints))
-    request = Request((str(cloud),), folder / "out", outlines, settings=settings or Settings())
-    reconstruct_area(request)
-    return {row["id"]: row for row in read_parameters(folder / "out" / "parameters.jsonl")}
+    """The rows of a run by id."""
+    return run_points(folder, xyz, classes, footprints, settings=settings or Settings())[0]
 
 
 def make_settings(roofs):
@@ -89,9 +86,7 @@ def test_how_points_are_cut_into_files_changes_no_building(tmp_path):
         reconstruct_area(
             Request(tuple(map(str, parts)), tmp_path / "cut", str(tmp_path / "footprints.geojson"))
         )
-    assert {
-        row["id"]: row for row in read_parameters(tmp_path / "cut" / "parameters.jsonl")
-    } == whole
+    assert by_id(tmp_path / "cut") == whole
 
 
 @pytest.mark.parametrize("kind", [2, 3, 7, 9, 17])

@@ -8,17 +8,16 @@ from pathlib import Path
 import numpy as np
 import pyproj
 import pytest
-import rasterio
 import shapely
-from rasterio.transform import from_origin
 
-from hiproof import read_parameters
 from hiproof.city.plan.prepare import make_plan
-from hiproof.city.run import Request, reconstruct_area
+from hiproof.city.run import Request
 from hiproof.cli.running import print_summary
 from hiproof.errors import InputError, InputWarning
 from hiproof.read.crs.positions import stretch
 from hiproof.status import Doubt
+from layers import write_raster
+from run_records import run_points
 from tiny_town import ORIGIN, make_town, write_cloud, write_footprints, write_town
 
 TOWN = make_town(houses=1)
@@ -28,27 +27,15 @@ def write_terrain(path, height, east=0.0):
     """A terrain model of that height, or those heights (80, 80), around the town, or so far east of
     it.
     """
-    options = {
-        "driver": "GTiff",
-        "width": 80,
-        "height": 80,
-        "count": 1,
-        "dtype": "float32",
-        "crs": "EPSG:28992",
-    }
-    transform = from_origin(ORIGIN[0] - 20 + east, ORIGIN[1] + 60, 1.0, 1.0)
-    with rasterio.open(path, "w", transform=transform, **options) as file:
-        file.write(np.broadcast_to(np.asarray(height, "float32"), (1, 80, 80)))
-    return str(path)
+    heights = np.broadcast_to(np.asarray(height, "float32"), (80, 80))
+    return write_raster(path, heights, ORIGIN[0] - 20 + east, ORIGIN[1] + 60)
 
 
 def run_over_terrain(folder, height):
     """What the run writes of the only building over a terrain model of that height."""
-    cloud, footprints = write_town(folder, TOWN)
     terrain = write_terrain(folder / "dtm.tif", height)
-    reconstruct_area(Request((str(cloud),), folder / "out", str(footprints), terrain))
-    (row,) = read_parameters(folder / "out" / "parameters.jsonl")
-    return row
+    rows, _ = run_points(folder, TOWN.xyz, TOWN.classification, TOWN.footprints, terrain=terrain)
+    return rows["house-0"]
 
 
 @pytest.mark.parametrize(
@@ -81,14 +68,11 @@ def row_over_half(folder, code, with_ground=True):
     height = 40.0
     xyz = TOWN.xyz + [0, 0, height - ORIGIN[2]]
     selection = slice(None) if with_ground else TOWN.classification == 6
-    cloud = write_cloud(folder / "cloud.laz", xyz[selection], TOWN.classification[selection])
-    footprints = write_footprints(folder / "footprints.geojson", TOWN.footprints)
+    points = xyz[selection], TOWN.classification[selection]
     heights = np.full((80, 80), height, "float32")
     heights[:, :34] = code
     terrain = write_terrain(folder / "dtm.tif", heights)
-    reconstruct_area(Request((str(cloud),), folder / "out", str(footprints), terrain))
-    (row,) = read_parameters(folder / "out" / "parameters.jsonl")
-    return row
+    return run_points(folder, *points, TOWN.footprints, terrain=terrain)[0]["house-0"]
 
 
 @pytest.mark.parametrize("code", [-9999.0, 9999.0, -32767.0, 3.4e38, 0.0, 255.0])
@@ -114,16 +98,14 @@ def test_voids_around_buildings_have_the_ground_beside_them(tmp_path, void):
     """The cloud holds roofs alone, as where a model's makers took the ground out."""
     is_roof = TOWN.classification == 6
     xyz = TOWN.xyz[is_roof] + [0, 0, 40.0 - ORIGIN[2]]
-    cloud = write_cloud(tmp_path / "cloud.laz", xyz, TOWN.classification[is_roof])
-    footprints = write_footprints(tmp_path / "footprints.geojson", TOWN.footprints)
     (area,) = TOWN.footprints.values()
     x, y = np.meshgrid(ORIGIN[0] - 19.5 + np.arange(80), ORIGIN[1] + 59.5 - np.arange(80))
     heights = np.where(shapely.contains_xy(area.buffer(void), x, y), -9999.0, 40.0)
     terrain = write_terrain(tmp_path / "dtm.tif", heights)
     with warnings.catch_warnings():
         warnings.filterwarnings("error", message=".*has no height")
-        reconstruct_area(Request((str(cloud),), tmp_path / "out", str(footprints), terrain))
-    (row,) = read_parameters(tmp_path / "out" / "parameters.jsonl")
+        points = xyz, TOWN.classification[is_roof]
+        row = run_points(tmp_path, *points, TOWN.footprints, terrain=terrain)[0]["house-0"]
     assert row["z_ground"] == pytest.approx(40.0, abs=0.01)
     assert row["ground_source"].endswith("terrain model dtm.tif")
 
@@ -214,9 +196,7 @@ def test_a_run_counts_what_its_details_leave_in_doubt(tmp_path, capsys):
     xyz = town.xyz.copy()
     on_first = (town.classification == 6) & (xyz[:, 0] < ORIGIN[0] + 30)
     xyz[np.flatnonzero(on_first)[::2], 2] += 0.5
-    cloud = write_cloud(tmp_path / "cloud.laz", xyz, town.classification)
-    footprints = write_footprints(tmp_path / "footprints.geojson", town.footprints)
-    summary = reconstruct_area(Request((str(cloud),), tmp_path / "out", str(footprints)))
+    _, summary = run_points(tmp_path, xyz, town.classification, town.footprints)
     assert summary.doubts[Doubt.TWO_SURFACES] == 1 and set(summary.doubts.values()) == {1}
     print_summary(summary, str(tmp_path / "out"))
     assert "by remark in hiproof_detail: two surfaces 1" in capsys.readouterr().out

@@ -4,8 +4,6 @@ import numpy as np
 import pytest
 import shapely
 
-from hiproof import read_parameters
-from hiproof.city.run import Request, reconstruct_area
 from hiproof.city.work.other_classes import (
     OtherPoints,
     explain_missing_points,
@@ -14,7 +12,8 @@ from hiproof.city.work.other_classes import (
 )
 from hiproof.settings import Settings
 from hiproof.status import Doubt
-from tiny_town import ORIGIN, make_town, write_cloud, write_footprints
+from run_records import run_points
+from tiny_town import ORIGIN, make_town
 
 TOWN = make_town(houses=3)
 ON_FIRST = (TOWN.classification == 6) & (TOWN.xyz[:, 0] < ORIGIN[0] + 30)
@@ -22,15 +21,9 @@ ON_FIRST = (TOWN.classification == 6) & (TOWN.xyz[:, 0] < ORIGIN[0] + 30)
 
 def run_of(folder, xyz, classification, settings=None):
     """What a run says of the buildings of TOWN by id, and what it counts, over other points."""
-    folder.mkdir(exist_ok=True)
-    cloud = write_cloud(folder / "cloud.laz", xyz, classification)
-    footprints = write_footprints(folder / "footprints.geojson", TOWN.footprints)
     settings = settings or Settings()
-    summary = reconstruct_area(
-        Request((str(cloud),), folder / "out", str(footprints), settings=settings)
-    )
-    rows = read_parameters(folder / "out" / "parameters.jsonl")
-    return {row["id"]: (row["status"], row["detail"]) for row in rows}, summary.doubts
+    rows, summary = run_points(folder, xyz, classification, TOWN.footprints, settings=settings)
+    return {id: (row["status"], row["detail"]) for id, row in rows.items()}, summary.doubts
 
 
 def make_ground(points):

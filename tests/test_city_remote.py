@@ -4,14 +4,13 @@ as from files.
 
 import numpy as np
 import pytest
-import rasterio
-from rasterio.transform import from_origin
 
 import planted
 from hiproof.city import run as city_run
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.errors import InputError
 from hiproof.read.points.pointcloud import read_points
+from layers import write_raster
 from range_server import serve
 from read.test_pointcloud import write_copc, write_ply, write_text
 from run_records import RECORDS
@@ -34,19 +33,7 @@ def write_terrain(path, town):
     lower, upper = town.xyz.min(axis=0) - 20, town.xyz.max(axis=0) + 20
     columns, rows = np.ceil(upper[:2] - lower[:2]).astype(int)
     heights = np.full((rows, columns), 1.5, np.float32)
-    with rasterio.open(
-        path,
-        "w",
-        driver="GTiff",
-        width=columns,
-        height=rows,
-        count=1,
-        dtype="float32",
-        crs="EPSG:28992",
-        transform=from_origin(lower[0], upper[1], 1, 1),
-    ) as file:
-        file.write(heights, 1)
-    return path
+    return write_raster(path, heights, lower[0], upper[1])
 
 
 def test_clouds_footprints_and_terrain_by_address_give_the_same_bytes(

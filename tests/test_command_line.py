@@ -3,8 +3,6 @@
 import json
 import re
 import shlex
-import subprocess
-import sys
 import time
 
 import numpy as np
@@ -19,6 +17,7 @@ from hiproof.compiled import news
 from hiproof.errors import SettingsError
 from hiproof.log import Level, start
 from hiproof.progress import show_progress
+from programs import run_python
 from sample_models import sample_points, write_sample_run
 
 GROUPS = ["Reconstruct", "Inspect", "Edit", "Export", "Network"]
@@ -45,8 +44,7 @@ def test_the_help_imports_no_package_that_computes():
         "except SystemExit: pass\n"
         "print([m for m in ('numpy', 'shapely', 'rich', 'numba') if m in sys.modules])"
     )
-    done = subprocess.run([sys.executable, "-c", code, "--help"], capture_output=True, text=True)
-    assert done.stdout.splitlines()[-1] == "[]", done.stderr
+    assert run_python(code, "--help").splitlines()[-1] == "[]"
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -77,8 +75,7 @@ def test_a_command_shows_that_it_works_before_it_imports_what_computes(name):
         f"import sys, hiproof.cli.app as app; app.import_command({name!r}); "
         f"print([m for m in {heavy} if m in sys.modules])"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert done.stdout.strip() == "[]", done.stderr
+    assert run_python(code).strip() == "[]"
 
 
 @pytest.mark.parametrize("name", ["reconstruct", "update", "enrich", "build"])

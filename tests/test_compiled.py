@@ -9,7 +9,6 @@ import os
 import pickle
 import platform
 import re
-import subprocess
 import sys
 import tempfile
 import warnings
@@ -23,6 +22,7 @@ import hiproof
 from hiproof.city.work import warm
 from hiproof.compiled import kept, news, stamp
 from hiproof.errors import NotKeptWarning
+from programs import run_python
 
 PACKAGE = Path(hiproof.__file__).parent
 SOURCES = sorted(PACKAGE.rglob("*.py"))
@@ -181,22 +181,22 @@ def test_a_function_that_compiled_code_called_is_called_by_python_as_well(town):
     imports = "from test_compiled import is_loaded; from town.inner import number; "
     inner_code = imports + "print(number(10), is_loaded(number))"
     for _ in range(2):
-        assert run(town, "-c", inner_code).split() == ["30", "True"]
+        assert run(town, inner_code).split() == ["30", "True"]
         assert [name.split("-")[0] for name in files_in(town) if "-python." in name] == [
             "inner.number",
             "outer.answer",
         ]
     both_code = "from town.inner import number; from town.outer import answer; "
-    printed = run(town, "-c", both_code + "print(answer(10), number(10), number(10))")
+    printed = run(town, both_code + "print(answer(10), number(10), number(10))")
     assert printed.split() == ["61", "30", "30"]
 
 
 def test_a_wrapper_made_for_loaded_code_carries_arrays_tuples_and_errors(town):
     (town / "town" / "pairs.py").write_text(PAIRS)
-    assert run(town, "-c", ASK_PAIRS) == "[0. 0.] [ True]\n"
+    assert run(town, ASK_PAIRS) == "[0. 0.] [ True]\n"
     for _ in range(2):
         pair = "Pair(first=array([ True]), second=array([0., 0.]))"
-        assert run(town, "-c", ASK_PAIRS + ASK_PAIRS_MORE).splitlines()[1:] == [
+        assert run(town, ASK_PAIRS + ASK_PAIRS_MORE).splitlines()[1:] == [
             pair,
             "expected a number",
         ]
@@ -232,7 +232,7 @@ from town.outer import answer
 print(mark("solid", "stamp", read_processor()), answer(10), is_loaded(answer))
 """
     first_host, second_host = (
-        run(town, "-c", script.format(host=host)).split() for host in ("here", "there")
+        run(town, script.format(host=host)).split() for host in ("here", "there")
     )
     assert first_host[1:] == ["61", "False"] and second_host[1:] == ["61", "True"]
     assert first_host[0] == second_host[0]
@@ -246,22 +246,10 @@ def test_a_changed_line_makes_what_stands_on_it_new_and_removes_the_old(town):
     assert len(files_in(town)) == 4 and files_in(town)[0] == unchanged
 
 
-def run(packages, *command):
-    """The output of a process that finds this hiproof and what is in `packages`."""
-    environment = {
-        **os.environ,
-        "PYTHONPATH": os.pathsep.join(map(str, (packages, PACKAGE.parent, Path(__file__).parent))),
-    }
-    process = subprocess.run(
-        [sys.executable, *command],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=300,
-        env=environment,
-    )
-    assert process.returncode == 0, process.stderr
-    return process.stdout
+def run(packages, code):
+    """The output of code that finds this hiproof and what is in `packages`."""
+    places = packages, PACKAGE.parent, Path(__file__).parent
+    return run_python(code, PYTHONPATH=os.pathsep.join(map(str, places)))
 
 
 @pytest.mark.parametrize(
@@ -484,7 +472,7 @@ def test_a_large_function_is_called_and_not_copied(town):
     (_, first_is_large, *_), (_, _, callees, _) = first, other
     assert first_is_large and [callee.name for callee in callees] == ["number"]
     kept_files = files_in(town)
-    printed = run(town, "-c", "from town.outer import answer; print(answer(10.5))")
+    printed = run(town, "from town.outer import answer; print(answer(10.5))")
     assert float(printed) == fast
     assert files_in(town) == kept_files, "a new process loads the function that another calls"
 
@@ -531,11 +519,11 @@ def test_code_of_two_processes_meets_in_a_third_without_mistaking_one_for_the_ot
     functions = ("nanmin", "nanmax")
     for function in functions:
         (town / "town" / f"{function}.py").write_text(LIBRARY.format(function=function))
-    single_answers = [run(town, "-c", ask.format(function)) for function in functions]
+    single_answers = [run(town, ask.format(function)) for function in functions]
     files = [path for path in town.rglob("*.nbc") if "-python." not in path.name]
     numbers = [set(re.findall(rb"_ZN5numba\w*?B\d+v(\d+)B", path.read_bytes())) for path in files]
     assert len(numbers) == 2 and all(numbers) and not numbers[0] & numbers[1]
-    assert run(town, "-c", "\n".join(map(ask.format, functions))) == "".join(single_answers)
+    assert run(town, "\n".join(map(ask.format, functions))) == "".join(single_answers)
 
 
 def test_constants_in_a_call_compile_nothing_apart(town):
@@ -575,7 +563,7 @@ for given in (with_footprints, few, one):
     assert reconstruct_area(request).buildings > 3
     print(sorted(asked - beforehand))
 """
-    assert run(tmp_path, "-c", script) == "[]\n[]\n[]\n"
+    assert run(tmp_path, script) == "[]\n[]\n[]\n"
 
 
 @pytest.mark.parametrize("total", [1, 7, 222])
@@ -604,7 +592,7 @@ with warnings.catch_warnings(record=True) as remarks:
     from town.outer import answer
     print(answer(10), [remark.category.__name__ for remark in remarks])
 """
-    assert run(town, "-c", script) == "61 ['NotKeptWarning']\n"
+    assert run(town, script) == "61 ['NotKeptWarning']\n"
     assert files_in(town) == []
 
 

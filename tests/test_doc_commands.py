@@ -8,8 +8,6 @@ import tomllib
 from pathlib import Path
 
 import laspy
-import numpy as np
-import pyogrio
 import pytest
 import shapely
 from click.testing import CliRunner
@@ -19,6 +17,7 @@ from hiproof.cli.app import app
 from hiproof.parametric.override import read_override
 from hiproof.settings import Settings
 from hiproof.simulate import demo_files
+from layers import write_layer
 from weather import write_epw
 
 ROOT = Path(__file__).parents[1]
@@ -90,27 +89,14 @@ def write_passages(path, outline):
     """Write a passage through a house, 2.5 m high."""
     xmin, ymin, xmax, ymax = outline.bounds
     passage = shapely.box(xmin - 1, (ymin + ymax) / 2 - 1, xmax + 1, (ymin + ymax) / 2 + 1)
-    pyogrio.raw.write(
-        path,
-        np.array([shapely.to_wkb(passage)]),
-        [np.array([2.5])],
-        ["height"],
-        geometry_type="Polygon",
-        crs="EPSG:28992",
-    )
+    write_layer(path, [passage], {"height": [2.5]})
 
 
 def write_register(path, footprints):
     """Write footprints with the heights that a register knows."""
-    heights = {"id": [f.id for f in footprints], "hoogte": 6.0, "maaiveld": 0.5}
-    pyogrio.raw.write(
-        path,
-        np.array([shapely.to_wkb(f.polygon) for f in footprints]),
-        [np.array(np.broadcast_to(values, len(footprints))) for values in heights.values()],
-        list(heights),
-        geometry_type="Polygon",
-        crs="EPSG:28992",
-    )
+    count = len(footprints)
+    columns = {"id": [f.id for f in footprints], "hoogte": [6.0] * count, "maaiveld": [0.5] * count}
+    write_layer(path, [f.polygon for f in footprints], columns)
 
 
 @pytest.fixture(scope="module")

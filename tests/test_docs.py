@@ -6,7 +6,6 @@ import json
 import pkgutil
 import re
 import runpy
-import subprocess
 import sys
 from itertools import chain
 from pathlib import Path
@@ -21,17 +20,13 @@ from hiproof.primitives import CATALOGUE
 from hiproof.primitives.catalogue import describe_type
 from hiproof.settings import EnrichSettings, Settings
 from hiproof.simulate import demo_files
+from programs import run_python
 
 ROOT = Path(__file__).parents[1]
 PAGES = {
     path.relative_to(ROOT).as_posix(): blocks
     for path in (ROOT / "README.md", *(ROOT / "docs").rglob("*.md"))
     if (blocks := re.findall(r"```python\n(.*?)```", path.read_text(encoding="utf-8"), re.DOTALL))
-}
-ENVIRONMENT = {
-    "PYTHONPATH": str(ROOT / "src"),
-    "PATH": "/usr/bin:/bin",
-    "OPENBLAS_NUM_THREADS": "1",
 }
 COMMANDS = app.commands
 MODULES = {
@@ -94,14 +89,9 @@ def test_examples_run(example, tmp_path, monkeypatch, capsys):
     assert capsys.readouterr().out.strip()
 
 
-def test_the_example_of_a_new_primitive_runs(tmp_path):
+def test_the_example_of_a_new_primitive_runs():
     """In a process of its own, where the shape stays in the catalogue."""
-    command = [sys.executable, ROOT / "examples" / "new_primitive.py"]
-    process = subprocess.run(
-        command, capture_output=True, text=True, env=ENVIRONMENT, cwd=tmp_path, check=False
-    )
-    assert process.returncode == 0, process.stderr
-    assert process.stdout.strip()
+    assert run_python((ROOT / "examples/new_primitive.py").read_text(encoding="utf-8")).strip()
 
 
 def test_the_notebook_runs_and_is_stored_with_its_outputs():
@@ -186,7 +176,4 @@ def test_the_sites_generated_pages_tell_every_command_option_and_setting():
 )
 def test_nothing_is_imported_that_few_need(modules, absent):
     code = f"import sys, {modules}; print([m for m in ({absent}) if m in sys.modules])"
-    process = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, env=ENVIRONMENT, check=True
-    )
-    assert process.stdout.strip() == "[]"
+    assert run_python(code).strip() == "[]"

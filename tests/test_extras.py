@@ -3,7 +3,6 @@ before any work.
 """
 
 import re
-import subprocess
 import sys
 import tomllib
 from pathlib import Path
@@ -14,8 +13,8 @@ import shapely
 from click.testing import CliRunner
 
 import hiproof
+import hiproof.learn
 from hiproof.city.run import Request, reconstruct_area
-from hiproof.cli import main
 from hiproof.edit.points import RunPoints
 from hiproof.errors import InputError
 from hiproof.segment import inference, segment
@@ -23,7 +22,7 @@ from hiproof.segment.files import segment_files
 from hiproof.settings import Settings
 from hiproof.simulate import demo_files
 from hiproof.simulate.__main__ import app as simulate
-from test_docs import ENVIRONMENT
+from programs import run_hiproof, run_python
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -92,14 +91,6 @@ def make_pattern(package):
     )
 
 
-def command(*arguments):
-    """Exit code of the command."""
-    with pytest.MonkeyPatch.context() as patch, pytest.raises(SystemExit) as ended:
-        patch.setattr(sys, "argv", ["hiproof", *map(str, arguments)])
-        main()
-    return ended.value.code
-
-
 @pytest.mark.parametrize("name", NEEDY)
 def test_a_run_that_needs_what_is_missing_is_refused_before_it_reads_or_writes(
     name, hide_package, tmp_path, capsys
@@ -112,7 +103,8 @@ def test_a_run_that_needs_what_is_missing_is_refused_before_it_reads_or_writes(
     (out / "buildings.gml").write_text("an earlier run's")
     hide_package(package)
     assert (
-        command("reconstruct", cloud, "--out", out, "--config", config, "--restart", *options) == 2
+        run_hiproof("reconstruct", cloud, "--out", out, "--config", config, "--restart", *options)
+        == 2
     )
     (line,) = capsys.readouterr().err.splitlines()
     assert re.match(make_pattern(package), line.removeprefix("hiproof: "))
@@ -133,10 +125,10 @@ def test_one_primitive_by_the_points_alone_is_said_to_do_without(
         tmp_path,
         *options,
     ]
-    assert command(*arguments) == 2
+    assert run_hiproof(*arguments) == 2
     assert capsys.readouterr().err.endswith("or --network never to go by the points alone\n")
     if options == ["--parts", "one"]:
-        assert command(*arguments, "--network", "never") == 0
+        assert run_hiproof(*arguments, "--network", "never") == 0
 
 
 def test_points_by_address_are_refused_before_anything_is_written(hide_package, tmp_path):
@@ -158,7 +150,7 @@ def test_footprints_by_address_name_the_extra_of_their_format(source, hide_packa
 def test_labelling_is_refused_before_it_reads_or_writes(hide_package, tmp_path, capsys):
     hide_package("onnxruntime")
     assert (
-        command("segment", tmp_path / "missing.laz", "--out", tmp_path / "out" / "labelled.laz")
+        run_hiproof("segment", tmp_path / "missing.laz", "--out", tmp_path / "out" / "labelled.laz")
         == 2
     )
     (line,) = capsys.readouterr().err.splitlines()
@@ -252,19 +244,9 @@ sys.modules["hiproof.cli.demo"].make_request = lambda out: replace(make_request(
     run = "from hiproof.cli import main\ntry: main()\nexcept SystemExit as end: code = end.code\n"
     tell = "print(code, [m for m in ('rasterio', 'onnxruntime') if sys.modules.get(m)])"
     for names in (" ".join(PACKAGES), "nothing"):
-        arguments = [
-            sys.executable,
-            "-c",
-            f"{hide}{box}{run}{tell}",
-            "demo",
-            "--out",
-            str(tmp_path / names[:7]),
-            names,
-        ]
-        process = subprocess.run(
-            arguments, capture_output=True, text=True, env=ENVIRONMENT, check=True
-        )
-        assert process.stdout.splitlines()[-1] == "0 []"
+        code = f"{hide}{box}{run}{tell}"
+        printed = run_python(code, "demo", "--out", tmp_path / names[:7], names)
+        assert printed.splitlines()[-1] == "0 []"
     models = [path.read_bytes() for path in tmp_path.glob("*/buildings.gml")]
     assert len(models) == 2 and models[0] == models[1]
 

@@ -3,7 +3,6 @@
 import json
 
 import numpy as np
-import pyogrio
 import pytest
 import shapely
 
@@ -15,6 +14,7 @@ from hiproof.parametric.building import build
 from hiproof.parametric.fallback import read_fallback
 from hiproof.parametric.run import build_file
 from hiproof.settings import ReadSettings, Settings
+from layers import write_layer
 from run_records import by_id, records
 from tiny_town import ORIGIN, make_town, write_cloud
 
@@ -40,16 +40,9 @@ def files(tmp_path_factory):
         str(write_cloud(folder / f"{name}.laz", town.xyz[mask], town.classification[mask]))
         for name, mask in (("whole", ~hidden), ("west", near))
     ]
-    columns = [np.array(list(town.footprints), object), *map(np.array, HEIGHTS.values())]
-    pyogrio.raw.write(
-        folder / "footprints.gpkg",
-        shapely.to_wkb(np.array(list(town.footprints.values()), object)),
-        columns,
-        ["id", *HEIGHTS],
-        geometry_type="Polygon",
-        crs="EPSG:28992",
-    )
-    return clouds, str(folder / "footprints.gpkg")
+    columns = {"id": list(town.footprints), **HEIGHTS}
+    path = write_layer(folder / "footprints.gpkg", town.footprints.values(), columns)
+    return clouds, str(path)
 
 
 def run(cloud, footprints, out, **read):

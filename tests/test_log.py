@@ -3,8 +3,6 @@ either.
 """
 
 import logging
-import subprocess
-import sys
 import warnings
 from pathlib import Path
 
@@ -15,8 +13,8 @@ from hiproof import log
 from hiproof.city import run as city_run
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.city.work.processes import Processes
-from hiproof.cli import main
 from hiproof.errors import InputError, InputWarning, OutputError
+from programs import run_hiproof, run_python
 
 
 def read_lines(path):
@@ -120,13 +118,8 @@ def test_the_command_line_keeps_its_errors_in_the_file(tmp_path, monkeypatch, ca
 
     monkeypatch.setattr("hiproof.city.run.reconstruct_area", refuse)
     (tmp_path / "a.laz").write_bytes(b"LASF")
-    arguments = ["reconstruct", str(tmp_path / "a.laz"), "--out", str(tmp_path / "out")]
-    monkeypatch.setattr(
-        sys, "argv", ["hiproof", *arguments, "--log-file", str(tmp_path / "run.log"), "--quiet"]
-    )
-    with pytest.raises(SystemExit) as ended:
-        main()
-    assert ended.value.code == 2
+    arguments = ["reconstruct", tmp_path / "a.laz", "--out", tmp_path / "out", "--quiet"]
+    assert run_hiproof(*arguments, "--log-file", tmp_path / "run.log") == 2
     assert read_lines(tmp_path / "run.log") == [
         ("ERROR", "expected points at https://u:...@host, got none")
     ]
@@ -135,10 +128,7 @@ def test_the_command_line_keeps_its_errors_in_the_file(tmp_path, monkeypatch, ca
 
 def test_the_library_itself_sets_nothing_up():
     code = "import hiproof.log, logging; print(logging.getLogger('hiproof').handlers)"
-    output = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True
-    )
-    assert output.stdout == "[]\n"
+    assert run_python(code) == "[]\n"
 
 
 def test_lines_of_several_workers_stay_whole(tmp_path):

@@ -3,7 +3,6 @@ repeats them.
 """
 
 import json
-import sys
 import warnings
 
 import pytest
@@ -11,9 +10,9 @@ import pytest
 import planted
 from hiproof.city import run as city_run
 from hiproof.city.run import Request, reconstruct_area
-from hiproof.cli import main
 from hiproof.errors import HiproofError, InputError, InputWarning
 from hiproof.masking import mask, masked_values
+from programs import run_hiproof
 
 ADDRESSES = [
     "postgresql://adm:{}@host:5432/db?table=fp",
@@ -109,10 +108,7 @@ def test_an_error_of_our_own_shows_its_traceback_without_secrets(monkeypatch, ca
         raise RuntimeError("planted at https://adm:s3cret@host/a.laz")
 
     monkeypatch.setattr("hiproof.write.attribute_list.attributes_text", fail)
-    monkeypatch.setattr(sys, "argv", ["hiproof", "attributes"])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    assert ended.value.code == 1
+    assert run_hiproof("attributes") == 1
     output = capsys.readouterr().err
     assert "planted" in output and "Traceback" in output and "s3cret" not in output
 

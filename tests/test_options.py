@@ -2,7 +2,6 @@
 or the run begins.
 """
 
-import sys
 import warnings
 
 import pytest
@@ -11,9 +10,10 @@ from hiproof import log
 from hiproof.city.plan.checks import refuse_unusable
 from hiproof.city.run import Summary
 from hiproof.city.work.processes import Processes
-from hiproof.cli import main
 from hiproof.errors import InputWarning
 from hiproof.evaluate.overview import Overview
+from hiproof.settings import Settings
+from programs import run_hiproof
 
 RUNS = None
 HUGE = "9" * 5000
@@ -141,30 +141,15 @@ def begun(monkeypatch):
 
 
 @pytest.mark.parametrize("name", CONFIGURATIONS)
-def test_a_configuration_begins_or_gets_one_sentence(
-    name, begun, town_files, tmp_path, monkeypatch, capsys
-):
-    from hiproof.settings import Settings
-
+def test_a_configuration_begins_or_gets_one_sentence(name, begun, town_files, tmp_path, capsys):
     toml, options, expected = CONFIGURATIONS[name]
     config = tmp_path / "settings.toml"
     config.write_text(toml.format(defaults=Settings().to_toml(), cloud=town_files[0]))
-    arguments = [
-        "reconstruct",
-        town_files[0],
-        "--out",
-        str(tmp_path / "out"),
-        "--config",
-        str(config),
-        *options,
-    ]
-    monkeypatch.setattr(
-        sys, "argv", ["hiproof", *(option.replace("{{}}", "{}") for option in arguments)]
-    )
-    with pytest.raises(SystemExit) as ended:
-        main()
+    given = [option.replace("{{}}", "{}") for option in options]
+    places = ["--out", tmp_path / "out", "--config", config]
+    code = run_hiproof("reconstruct", town_files[0], *places, *given)
     output = capsys.readouterr().err
-    assert (ended.value.code, len(begun)) == ((0, 1) if expected is RUNS else (2, 0)), output
+    assert (code, len(begun)) == ((0, 1) if expected is RUNS else (2, 0)), output
     assert "Traceback" not in output
     if expected is not RUNS:
         assert expected in output and len(output) < 1000

@@ -21,6 +21,7 @@ from hiproof.parametric.override import overridden, read_override
 from hiproof.settings import Settings
 from hiproof.status import Grade, Status
 from hiproof.write.parameters import building_record
+from layers import write_layer
 from run_records import by_id, records
 from tiny_town import make_town, write_cloud, write_footprints
 
@@ -310,11 +311,9 @@ def columns_request(town_files, tmp_path, pair):
     of override_columns.
     """
     meta, _, outlines, columns = pyogrio.raw.read(town_files[1])
-    types = np.array(["hip", *[None] * (len(outlines) - 1)], object)
-    names, path = [*meta["fields"], "daktype"], tmp_path / "footprints.gpkg"
-    pyogrio.raw.write(
-        path, outlines, [*columns, types], names, geometry_type="Polygon", crs=meta["crs"]
-    )
+    columns = dict(zip(meta["fields"], columns, strict=True))
+    columns["daktype"] = np.array(["hip", *[None] * (len(outlines) - 1)], object)
+    path = write_layer(tmp_path / "footprints.gpkg", shapely.from_wkb(outlines), columns)
     settings = PLAIN.replace({"read": {"override_columns": [pair]}})
     return hiproof.Request((town_files[0],), tmp_path / "out", str(path), settings=settings)
 
@@ -331,12 +330,8 @@ def columns_run(folder, key, values, town):
     override's `key`.
     """
     cloud = write_cloud(folder / "cloud.laz", town.xyz, town.classification)
-    outlines = shapely.to_wkb(np.array(list(town.footprints.values()), object))
-    columns = [np.array(list(town.footprints), object), np.array(values)]
-    path = folder / "footprints.gpkg"
-    pyogrio.raw.write(
-        path, outlines, columns, ["id", "known"], geometry_type="Polygon", crs="EPSG:28992"
-    )
+    columns = {"id": list(town.footprints), "known": values}
+    path = write_layer(folder / "footprints.gpkg", town.footprints.values(), columns)
     settings = PLAIN.replace({"read": {"override_columns": [f"known={key}"]}})
     city_run.reconstruct_area(
         hiproof.Request((str(cloud),), folder / "out", str(path), settings=settings)

@@ -4,7 +4,6 @@ loopback address.
 
 import dataclasses
 import json
-import sys
 
 import numpy as np
 import pyogrio
@@ -16,11 +15,11 @@ import planted
 from hiproof.city import run as city_run
 from hiproof.city.plan.prepare import make_plan
 from hiproof.city.run import Request, reconstruct_area
-from hiproof.cli import main
 from hiproof.cli.reconstruct import find_settings_file
 from hiproof.errors import InputError, SettingsError
 from hiproof.read.outlines.footprints import read_footprints
 from hiproof.settings import Settings
+from programs import run_hiproof
 from range_server import serve
 from run_records import RECORDS
 from tiny_town import CRS, make_town, write_cloud, write_town
@@ -103,14 +102,6 @@ def served_release(tmp_path, monkeypatch):
         yield cloud, settings, log
 
 
-def command(monkeypatch, *arguments):
-    """Exit code of the command."""
-    monkeypatch.setattr(sys, "argv", ["hiproof", *map(str, arguments)])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    return ended.value.code
-
-
 def test_a_run_takes_the_buildings_of_the_clouds_extent(served_release, tmp_path):
     cloud, settings, _ = served_release
     out = tmp_path / "out"
@@ -162,14 +153,14 @@ def test_settings_beside_are_not_looked_for_where_overture_is(
     assert find_settings_file(str(served_release[0]), "overture") is None
 
 
-def test_a_kept_file_gives_the_same_models(served_release, tmp_path, monkeypatch, capsys):
+def test_a_kept_file_gives_the_same_models(served_release, tmp_path, capsys):
     cloud, settings, _ = served_release
     config, stored = tmp_path / "settings.toml", tmp_path / "kept.gpkg"
     config.write_text(settings.to_toml())
-    assert command(monkeypatch, "footprints", cloud, "--out", stored, "--config", config) == 0
+    assert run_hiproof("footprints", cloud, "--out", stored, "--config", config) == 0
     output = capsys.readouterr().out
     other = tmp_path / "kept.geojson"
-    assert command(monkeypatch, "footprints", cloud, "--out", other, "--config", config) == 2
+    assert run_hiproof("footprints", cloud, "--out", other, "--config", config) == 2
     assert "expected --out to name a GeoPackage" in capsys.readouterr().err
     assert f"{stored}: 4 footprints of Overture Maps {RELEASE} (ODbL-1.0" in output
     _, _, _, columns = pyogrio.raw.read(
@@ -192,13 +183,11 @@ def test_a_kept_file_gives_the_same_models(served_release, tmp_path, monkeypatch
     assert notes[0] == notes[1]
 
 
-def test_only_the_row_groups_that_meet_the_extent_are_fetched(
-    served_release, tmp_path, monkeypatch
-):
+def test_only_the_row_groups_that_meet_the_extent_are_fetched(served_release, tmp_path):
     cloud, settings, log = served_release
     config = tmp_path / "settings.toml"
     config.write_text(settings.to_toml())
-    command(monkeypatch, "footprints", cloud, "--out", tmp_path / "a.gpkg", "--config", config)
+    run_hiproof("footprints", cloud, "--out", tmp_path / "a.gpkg", "--config", config)
     request = {}
     for line in log.read_text().splitlines():
         path, start, stop = line.split()

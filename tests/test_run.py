@@ -22,7 +22,6 @@ from hiproof import read_parameters
 from hiproof.city import run as city_run
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.city.work.tasks import MAIN_JOB, WITHOUT_FOOTPRINTS, make_ready
-from hiproof.cli import main
 from hiproof.cli.app import app
 from hiproof.compiled import kept
 from hiproof.compiled.stamp import PACKAGE
@@ -31,9 +30,10 @@ from hiproof.errors import InputError
 from hiproof.evaluate.run import evaluate_run
 from hiproof.read.models.solids import read_solids
 from hiproof.settings import Settings
+from layers import write_layer
+from programs import run_hiproof, run_python
+from run_records import RECORDS, records
 from tiny_town import make_town, write_cloud, write_footprints, write_town
-
-RECORDS = ("buildings.gml", "buildings.city.jsonl", "parameters.jsonl")
 
 
 @pytest.fixture(scope="module")
@@ -47,10 +47,6 @@ def finished_run(files, tmp_path_factory):
     out = tmp_path_factory.mktemp("finished")
     cloud, footprints = files
     return out, reconstruct_area(Request((str(cloud),), out, str(footprints)))
-
-
-def records(out):
-    return {name: (out / name).read_bytes() for name in RECORDS}
 
 
 def parameters(out):
@@ -79,24 +75,11 @@ def test_the_run_record_names_settings_version_inputs_and_counts(finished_run):
 def test_a_run_is_measured_against_the_footprints_that_it_read(files, tmp_path):
     cloud, footprints = files
     _, _, geometry, _ = pyogrio.raw.read(footprints)
-    numbered = tmp_path / "numbered.gpkg"  # whose features are numbered 1 to 4, and called 4 to 1
-    pyogrio.raw.write(
-        numbered,
-        geometry,
-        [np.arange(4, 0, -1)],
-        ["number"],
-        geometry_type="Polygon",
-        crs="EPSG:28992",
-    )
-    reconstruct_area(
-        Request(
-            (str(cloud),),
-            tmp_path / "out",
-            str(numbered),
-            id_attribute="number",
-            where="number <> 2",
-        )
-    )
+    # whose features are numbered 1 to 4, and called 4 to 1
+    names, path = {"number": np.arange(4, 0, -1)}, tmp_path / "numbered.gpkg"
+    numbered = str(write_layer(path, shapely.from_wkb(geometry), names))
+    options = {"id_attribute": "number", "where": "number <> 2"}
+    reconstruct_area(Request((str(cloud),), tmp_path / "out", numbered, **options))
     run = evaluate_run(tmp_path / "out")
     assert [model.id for model in run.models] == ["4", "3", "1"]
     assert [f.quality.outline_iou > 0.95 for f in run.figures] == [True] * 3
@@ -244,12 +227,9 @@ def test_the_main_process_of_workers_imports_no_compiler(town_files, tmp_path):
         "summary = reconstruct_area(Request((cloud,), out, footprints, processes=2))\n"
         "print(summary.overview.headline, 'numba' in sys.modules)"
     )
-    command = [sys.executable, "-W", "ignore", "-c", code, *map(str, town_files)]
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "kept")}
-    done = subprocess.run(
-        [*command, str(tmp_path / "out")], capture_output=True, text=True, env=environment
-    )
-    assert done.stdout == "4 of 4 buildings modelled False\n", done.stderr
+    environment = {"NUMBA_CACHE_DIR": str(tmp_path / "kept"), "PYTHONWARNINGS": "ignore"}
+    printed = run_python(code, *town_files, tmp_path / "out", **environment)
+    assert printed == "4 of 4 buildings modelled False\n"
 
 
 def test_an_interrupted_run_goes_on_and_ends_the_same(finished_run, files, tmp_path, monkeypatch):
@@ -274,27 +254,14 @@ def test_an_interrupted_run_goes_on_and_ends_the_same(finished_run, files, tmp_p
 
 
 def test_a_killed_run_goes_on_and_ends_the_same(finished_run, files, tmp_path):
-    command = [
-        sys.executable,
-        "-m",
-        "hiproof",
-        "reconstruct",
-        str(files[0]),
-        "--footprints",
-        str(files[1]),
-        "--out",
-    ]
-    process = subprocess.Popen([*command, str(tmp_path)], env={**os.environ, "PYTHONPATH": "src"})
+    command = [sys.executable, "-m", "hiproof", "reconstruct", files[0], "--footprints", files[1]]
+    command, environment = [*command, "--out", tmp_path], {**os.environ, "PYTHONPATH": "src"}
+    process = subprocess.Popen(command, env=environment)
     while not (tmp_path / ".hiproof" / "plan.jsonl").exists() and process.poll() is None:
         time.sleep(0.02)
     process.send_signal(signal.SIGKILL)
     process.wait()
-    assert (
-        subprocess.run(
-            [*command, str(tmp_path)], env={**os.environ, "PYTHONPATH": "src"}, check=False
-        ).returncode
-        == 0
-    )
+    assert subprocess.run(command, env=environment, check=False).returncode == 0
     assert records(tmp_path) == records(finished_run[0])
 
 
@@ -353,10 +320,7 @@ def test_the_output_carries_the_reference_system_that_any_input_names(
 ):
     town = make_town(houses=1)
     cloud = write_cloud(tmp_path / "cloud.laz", town.xyz, town.classification, of_cloud)
-    ids = np.array(["house-0"], object)
-    geometry = shapely.to_wkb(np.array(list(town.footprints.values()), object))
-    path = tmp_path / "footprints.gpkg"
-    pyogrio.raw.write(path, geometry, [ids], ["id"], geometry_type="Polygon", crs=of_footprints)
+    path = write_footprints(tmp_path / "footprints.gpkg", town.footprints, of_footprints)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         reconstruct_area(Request((str(cloud),), tmp_path / "out", str(path)))
@@ -400,11 +364,7 @@ def test_the_command_line_says_what_it_did(files, tmp_path):
     ],
 )
 def test_wrong_usage_gets_one_sentence_and_exit_code_2(
-    arguments, expected, files, tmp_path, monkeypatch, capsys
+    arguments, expected, files, tmp_path, capsys
 ):
-    filled = [a.format(cloud=files[0], out=tmp_path) for a in arguments]
-    monkeypatch.setattr(sys, "argv", ["hiproof", *filled])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    assert ended.value.code == 2
+    assert run_hiproof(*(a.format(cloud=files[0], out=tmp_path) for a in arguments)) == 2
     assert expected in capsys.readouterr().err

@@ -5,7 +5,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pyogrio
 import pytest
 import shapely
 
@@ -24,7 +23,8 @@ from hiproof.settings import Settings
 from hiproof.write import building_attributes, roof_figures
 from hiproof.write.meshes.viewed import view_building
 from hiproof.write.parameters import building_record
-from tiny_town import CRS, ORIGIN
+from layers import write_layer
+from tiny_town import ORIGIN
 from written_run import require_valid_files
 
 GATE = shapely.box(*(CORNER + [4, -1]), *(CORNER + [7, 9]))
@@ -91,26 +91,13 @@ def test_viewers_and_tables_get_the_passage():
     assert "hiproof_passages" not in building_attributes(reconstruct())
 
 
-def write_layer(path, polygons, **columns):
-    wkb = shapely.to_wkb(polygons)
-    fields = {name: np.array(values) for name, values in columns.items()}
-    pyogrio.raw.write(
-        path,
-        wkb,
-        list(fields.values()),
-        list(fields),
-        geometry_type="Polygon",
-        crs=CRS.replace("7415", "28992"),
-    )
-    return str(path)
-
-
 @pytest.fixture
 def town_with_gates(town_files, tmp_path):
     """The tiny town with a passage below its first house, and one beside all houses."""
     gate = shapely.box(*(ORIGIN[:2] + [12, 11]), *(ORIGIN[:2] + [15, 21]))
     beside = shapely.box(*(ORIGIN[:2] - 50), *(ORIGIN[:2] - 45))
-    layer = write_layer(tmp_path / "gates.geojson", [gate, beside, gate], height=[2.5, 3.0, -1.0])
+    heights = {"height": [2.5, 3.0, -1.0]}
+    layer = str(write_layer(tmp_path / "gates.geojson", [gate, beside, gate], heights))
     settings = PLAIN.replace({"read": {"clearance_column": "height"}})
     return Request((town_files[0],), tmp_path / "out", town_files[1], settings=settings), layer
 

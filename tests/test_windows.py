@@ -4,8 +4,6 @@ that are in use, limits.
 
 import ast
 import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -13,6 +11,7 @@ import pytest
 import hiproof
 from hiproof.city.work import processes
 from hiproof.write.files import atomic_file
+from programs import run_python
 
 PACKAGE = Path(hiproof.__file__).parent
 NOT_ON_WINDOWS = {"fcntl", "resource", "pwd", "grp", "termios", "posix", "pty"}
@@ -46,10 +45,7 @@ def test_no_module_is_imported_that_windows_lacks():
 
 
 def test_names_that_windows_lacks_are_not_needed():
-    environment = {**os.environ, "PYTHONPATH": str(PACKAGE.parent)}
-    code = [sys.executable, "-c", WITHOUT_POSIX]
-    process = subprocess.run(code, capture_output=True, text=True, env=environment, check=False)
-    assert (process.returncode, process.stdout.strip()) == (0, "True"), process.stderr
+    assert run_python(WITHOUT_POSIX).strip() == "True"
 
 
 def test_files_are_synced_through_descriptors_that_may_write(tmp_path, monkeypatch):

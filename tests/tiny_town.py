@@ -8,9 +8,10 @@ from pathlib import Path
 
 import laspy
 import numpy as np
-import pyogrio
 import pyproj
 import shapely
+
+from layers import write_layer
 
 ORIGIN = np.array([85000.0, 446000.0, 2.0])
 CRS = "EPSG:7415"
@@ -84,10 +85,8 @@ def write_cloud(
 def write_footprints(
     path: Path, footprints: dict[str, shapely.Polygon], crs: str | None = "EPSG:28992"
 ) -> Path:
-    ids = np.array(list(footprints), object)
-    geometry = shapely.to_wkb(np.array(list(footprints.values()), object))
-    pyogrio.raw.write(path, geometry, [ids], ["id"], geometry_type="Unknown", crs=crs)
-    return path
+    ids, options = {"id": np.array(list(footprints), object)}, {"geometry_type": "Unknown"}
+    return write_layer(path, footprints.values(), ids, crs, **options)
 
 
 def write_town(folder: Path, town: Town | None = None) -> tuple[Path, Path]:

@@ -18,6 +18,7 @@ from hiproof.city import run as city_run
 from hiproof.city.work.processes import Processes
 from hiproof.cli.evaluate import evaluate
 from hiproof.compiled import news
+from programs import run_python
 from tiny_town import make_town, write_town
 
 
@@ -122,10 +123,7 @@ def test_importing_the_package_leaves_interrupts_alone():
         "import hiproof, signal; print(signal.getsignal(signal.SIGINT) is "
         "signal.default_int_handler)"
     )
-    assert (
-        subprocess.run([sys.executable, "-c", script], capture_output=True, text=True).stdout
-        == "True\n"
-    )
+    assert run_python(script) == "True\n"
 
 
 def interrupt_worker():

@@ -14,7 +14,6 @@ from jsonschema import Draft202012Validator
 
 import hiproof
 from hiproof.city.plan.overrides import override_records
-from hiproof.cli import main
 from hiproof.cli.app import app
 from hiproof.compose import check_solid
 from hiproof.errors import CompositionError, HiproofError, InputError
@@ -25,6 +24,7 @@ from hiproof.parametric.schema import schema, schema_text
 from hiproof.primitives import CATALOGUE
 from hiproof.primitives.parameters import list_parameters
 from hiproof.simulate import demo_files
+from programs import run_hiproof
 
 FILES = (
     "buildings.gml",
@@ -255,17 +255,12 @@ def test_a_first_building_whose_outline_crosses_itself_stops_no_other(tmp_path):
         ('{"hiproof_parameters": 1}\n' + "[" * 100_000 + "\n", "line 2"),
     ],
 )
-def test_a_file_that_cannot_be_read_is_refused_whole(text, message, tmp_path, capsys, monkeypatch):
+def test_a_file_that_cannot_be_read_is_refused_whole(text, message, tmp_path, capsys):
     (tmp_path / "p.jsonl").write_text(text)
     with pytest.raises(HiproofError, match=message):
         build_file(tmp_path / "p.jsonl", tmp_path / "out")
     assert not list((tmp_path / "out").glob("*"))
-    monkeypatch.setattr(
-        "sys.argv", ["hiproof", "build", str(tmp_path / "p.jsonl"), "--out", str(tmp_path / "out")]
-    )
-    with pytest.raises(SystemExit) as end:
-        main()
-    assert end.value.code == 2
+    assert run_hiproof("build", tmp_path / "p.jsonl", "--out", tmp_path / "out") == 2
     assert "Traceback" not in capsys.readouterr().err
 
 

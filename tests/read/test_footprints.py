@@ -17,6 +17,7 @@ from hiproof.read.crs.positions import doubtful_place, refuse_degrees
 from hiproof.read.outlines.footprints import footprint_crs, read_footprints
 from hiproof.read.outlines.polygons import simple_polygons
 from hiproof.settings import Settings
+from layers import write_layer
 
 pytestmark = pytest.mark.filterwarnings(
     "ignore:'crs' was not provided", "ignore:invalid value encountered"
@@ -86,19 +87,9 @@ def test_which_way_rings_go_round_depends_on_no_format(tmp_path, ending):
 
 def write_with_gaps(path, **fields):
     """Three squares, of which the second has none of the `fields`."""
-    squares = np.array([shapely.to_wkb(shift(SQUARE, 20 * i)) for i in range(3)], object)
-    gap = np.array([False, True, False])
-    columns = [np.array(["A", "B", "C"], object), *fields.values()]
-    pyogrio.raw.write(
-        str(path),
-        squares,
-        columns,
-        ["name", *fields],
-        [None] + [gap] * len(fields),
-        geometry_type="Polygon",
-        crs="EPSG:28992",
-    )
-    return path
+    squares, gap = [shift(SQUARE, 20 * i) for i in range(3)], np.array([False, True, False])
+    columns, masks = {"name": ["A", "B", "C"], **fields}, [None] + [gap] * len(fields)
+    return write_layer(path, squares, columns, field_mask=masks)
 
 
 @pytest.mark.parametrize("ending", ["gpkg", "geojson", "fgb"])
@@ -293,18 +284,8 @@ def test_coordinates_that_are_no_numbers_enclose_no_area():
 
 def test_a_file_of_several_layers_needs_a_name(tmp_path):
     path = write(tmp_path / "a.gpkg", [SQUARE], name=np.array(["A"], object))
-    attributes = [np.array(["B", "C"], object)]
-    squares = shapely.to_wkb(np.array([shift(SQUARE, 20), shift(SQUARE, 40)], object))
-    pyogrio.raw.write(
-        path,
-        squares,
-        attributes,
-        ["name"],
-        layer="sheds",
-        geometry_type="Polygon",
-        crs="EPSG:28992",
-        append=True,
-    )
+    squares = [shift(SQUARE, 20), shift(SQUARE, 40)]
+    write_layer(path, squares, {"name": ["B", "C"]}, layer="sheds", append=True)
     for read in (read_footprints, footprint_crs):
         with pytest.raises(InputError, match="2: buildings, sheds; name one with --layer"):
             read(path)

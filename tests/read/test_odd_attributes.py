@@ -4,7 +4,6 @@ import json
 import sqlite3
 
 import numpy as np
-import pyogrio
 import pytest
 import shapely
 
@@ -13,6 +12,7 @@ from hiproof.errors import InputError, InputWarning
 from hiproof.model import Footprint
 from hiproof.read.outlines.footprints import read_footprints
 from hiproof.write.tables.geopackage import attributes_with_a_column
+from layers import write_layer
 
 SQUARES = [shapely.box(500000 + 20 * i, 4649776, 500010 + 20 * i, 4649786) for i in range(4)]
 
@@ -74,30 +74,16 @@ def test_an_impossible_date_goes_with_conditions_and_boxes(tmp_path):
 
 
 def test_a_date_of_a_shapefile_that_is_none_is_text(tmp_path):
-    path = tmp_path / "a.shp"
-    wkb = shapely.to_wkb(SQUARES).astype(object)
-    fields = [np.arange(4), np.array(["1999-12-31"] * 4, "datetime64[D]")]
-    pyogrio.raw.write(
-        str(path), wkb, fields, ["id", "built"], geometry_type="Polygon", crs="EPSG:32633"
-    )
+    columns = {"id": np.arange(4), "built": np.array(["1999-12-31"] * 4, "datetime64[D]")}
+    path = write_layer(tmp_path / "a.shp", SQUARES, columns, "EPSG:32633")
     table = (tmp_path / "a.dbf").read_bytes()
     (tmp_path / "a.dbf").write_bytes(table.replace(b"19991231", b"19500000", 1))
     assert read_values(path, "built")[0] == ["1950-00-00", "1999-12-31", "1999-12-31", "1999-12-31"]
 
 
 def test_text_in_no_encoding_keeps_what_can_be_read(tmp_path):
-    path = tmp_path / "a.gpkg"
-    wkb = shapely.to_wkb(SQUARES).astype(object)
-    names = np.array(["Straße", "b", "c", "d"], object)
-    pyogrio.raw.write(
-        str(path),
-        wkb,
-        [names],
-        ["name"],
-        geometry_type="Polygon",
-        crs="EPSG:32633",
-        SPATIAL_INDEX="NO",
-    )
+    path, names = tmp_path / "a.gpkg", {"name": ["Straße", "b", "c", "d"]}
+    write_layer(path, SQUARES, names, "EPSG:32633", SPATIAL_INDEX="NO")
     with sqlite3.connect(path) as base:
         for (trigger,) in base.execute(
             "select name from sqlite_master where type = 'trigger'"

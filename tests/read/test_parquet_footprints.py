@@ -5,13 +5,13 @@ a file with boxes only the row groups around the box asked for are read.
 import json
 
 import numpy as np
-import pyogrio
 import pytest
 import shapely
 from pyproj import CRS
 
 from hiproof.errors import InputError
 from hiproof.read.outlines.footprints import footprint_crs, read_footprints
+from layers import write_layer
 from range_server import serve
 
 pyarrow = pytest.importorskip("pyarrow", reason="the extra `parquet` is not installed")
@@ -82,18 +82,9 @@ def test_a_file_gives_what_a_geopackage_gives(tmp_path, encoding, has_boxes):
         year=YEARS,
         height=pyarrow.array([0.2] * 9, pyarrow.float32()),
     )
-    geopackage = tmp_path / "a.gpkg"
-    fields = [np.array(IDS, object), np.array([y or 0 for y in YEARS], np.int32)]
-    gap = np.array([y is None for y in YEARS])
-    pyogrio.raw.write(
-        str(geopackage),
-        wkb,
-        [*fields, np.full(9, 0.2)],
-        ["id", "year", "height"],
-        [None, gap, None],
-        geometry_type="Polygon",
-        crs="EPSG:28992",
-    )
+    years, gap = np.array([y or 0 for y in YEARS], np.int32), np.array([y is None for y in YEARS])
+    columns, masks = {"id": IDS, "year": years, "height": np.full(9, 0.2)}, [None, gap, None]
+    geopackage = write_layer(tmp_path / "a.gpkg", SHAPES, columns, field_mask=masks)
     assert footprint_crs(path) == RD
     for options in (
         {},

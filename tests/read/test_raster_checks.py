@@ -10,6 +10,7 @@ from rasterio.transform import Affine, from_origin
 from hiproof.errors import DamagedRaster, InputError, InputWarning
 from hiproof.frames import Units
 from hiproof.read import read_terrain
+from layers import write_raster
 
 WEST, NORTH, SIDE = 85000.0, 446200.0, 40
 PLACE = np.array([[WEST + 10.2, NORTH - 11.7]])
@@ -219,11 +220,8 @@ def test_pictures_and_complex_numbers_are_refused(tmp_path, options, words):
 
 @pytest.mark.parametrize("side", [1, 2])
 def test_a_tiny_raster_is_a_level_or_a_slope(tmp_path, side):
-    path, transform = tmp_path / "dtm.tif", from_origin(WEST, NORTH, 20, 20)
-    options = {"driver": "GTiff", "width": side, "height": side, "count": 1, "dtype": "float32"}
-    with rasterio.open(path, "w", crs="EPSG:28992", transform=transform, **options) as file:
-        file.write(np.full((1, side, side), 4.5, "float32"))
-    assert read_height(path) == 4.5
+    heights = np.full((side, side), 4.5, "float32")
+    assert read_height(write_raster(tmp_path / "dtm.tif", heights, WEST, NORTH, 20)) == 4.5
 
 
 def test_heights_in_feet_of_the_rasters_crs(tmp_path):

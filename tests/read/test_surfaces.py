@@ -8,7 +8,6 @@ import sqlite3
 import struct
 
 import numpy as np
-import pyogrio
 import pytest
 import shapely
 
@@ -20,6 +19,7 @@ from hiproof.read.outlines.polygons import (
     is_surface,
     simple_polygons,
 )
+from layers import write_layer
 
 pytestmark = pytest.mark.filterwarnings("ignore::hiproof.errors.InputWarning")
 X, Y = 500000.0, 4649776.0
@@ -100,11 +100,9 @@ KINDS = {
 
 def write(path, declared, *geometries):
     """A GeoPackage of a layer that is declared so, whatever its geometries are."""
-    box = shapely.to_wkb([shapely.box(X, Y, X + 1, Y + 1)] * len(geometries)).astype(object)
-    ids = np.array([f"h{i}" for i in range(len(geometries))], object)
-    pyogrio.raw.write(
-        str(path), box, [ids], ["id"], geometry_type="Polygon", crs="EPSG:32633", SPATIAL_INDEX="NO"
-    )
+    ids = [f"h{i}" for i in range(len(geometries))]
+    boxes = [shapely.box(X, Y, X + 1, Y + 1)] * len(geometries)
+    write_layer(path, boxes, {"id": ids}, "EPSG:32633", SPATIAL_INDEX="NO")
     with sqlite3.connect(path) as base:
         for (trigger,) in base.execute(
             "select name from sqlite_master where type = 'trigger'"
@@ -151,17 +149,7 @@ def test_layers_that_pyogrio_refuses_are_read(tmp_path, declared):
 
 def test_one_refused_layer_among_others_is_listed(tmp_path):
     path = write(tmp_path / "a.gpkg", "TIN", surface(TIN, TRIANGLE, triangles(body(SQUARE))))
-    wkb = shapely.to_wkb([shapely.box(0, 0, 5, 5)]).astype(object)
-    pyogrio.raw.write(
-        str(path),
-        wkb,
-        [],
-        [],
-        layer="sheds",
-        geometry_type="Polygon",
-        crs="EPSG:32633",
-        append=True,
-    )
+    write_layer(path, [shapely.box(0, 0, 5, 5)], crs="EPSG:32633", layer="sheds", append=True)
     with pytest.raises(InputError, match="got 2: a, sheds; name one with --layer"):
         read_footprints(path)
     assert [len(read_footprints(path, layer=layer)) for layer in ("a", "sheds")] == [1, 1]

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import rasterio
 from pyproj import Transformer
-from rasterio.transform import from_origin
 
+import layers
 from hiproof.errors import InputError
 from hiproof.geometry.thin import thin_to_grid
 from hiproof.read.terrain import TerrainChain, raster, read_terrain
@@ -22,22 +22,12 @@ def plane(xy):
 
 
 def write_raster(path, width=120, height=80, step=0.5, crs="EPSG:28992", hole=None, heights=None):
-    transform = from_origin(WEST, NORTH, step, step)
     columns, rows = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
     x, y = WEST + step * columns.ravel(), NORTH - step * rows.ravel()
     z = plane(np.column_stack([x, y])).reshape(height, width) if heights is None else heights
     if hole is not None:
         z[hole] = -9999
-    options = {
-        "driver": "GTiff",
-        "width": width,
-        "height": height,
-        "count": 1,
-        "dtype": "float64",
-        "nodata": -9999,
-    }
-    with rasterio.open(path, "w", crs=crs, transform=transform, **options) as file:
-        file.write(z, 1)
+    layers.write_raster(path, z, WEST, NORTH, step, crs, nodata=-9999)
     return path
 
 

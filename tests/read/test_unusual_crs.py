@@ -4,7 +4,6 @@ import struct
 
 import laspy
 import numpy as np
-import pyogrio
 import pyproj
 import pytest
 import shapely
@@ -21,6 +20,7 @@ from hiproof.read.points.las_crs import las_crs
 from hiproof.read.points.pointcloud import read_header, read_points
 from hiproof.read.terrain import read_terrain
 from hiproof.settings import Settings
+from layers import write_layer, write_raster
 
 pytestmark = pytest.mark.filterwarnings(
     "ignore:You will likely lose important projection information"
@@ -344,9 +344,7 @@ BOX = shapely.box(500000, 4649776, 500010, 4649786)
 
 def write_footprints(path, crs, units=1.0):
     """One square in `units` of a metre; `crs` is GDAL's text, or a GeoPackage's number."""
-    polygon = shapely.to_wkb([shapely.transform(BOX, lambda xy: xy / units)])
-    pyogrio.raw.write(str(path), polygon.astype(object), [], [], geometry_type="Polygon", crs=crs)
-    return path
+    return write_layer(path, [shapely.transform(BOX, lambda xy: xy / units)], crs=crs)
 
 
 UNPLACED = {
@@ -379,10 +377,7 @@ def test_footprints_of_no_place_are_taken_to_be_in_the_clouds_crs(tmp_path, kind
 
 def test_footprints_that_run_south_and_west_are_moved_to_a_cloud_that_does_not(tmp_path):
     krovak = shapely.box(1040000, 740000, 1040010, 740020)
-    wkb = shapely.to_wkb([krovak]).astype(object)
-    pyogrio.raw.write(
-        str(tmp_path / "f.gpkg"), wkb, [], [], geometry_type="Polygon", crs="EPSG:5513"
-    )
+    write_layer(tmp_path / "f.gpkg", [krovak], crs="EPSG:5513")
     (footprint,) = read_footprints(tmp_path / "f.gpkg", target_crs="EPSG:5514")
     assert np.allclose(footprint.polygon.bounds, (-740020, -1040010, -740000, -1040000), atol=1e-3)
 
@@ -444,18 +439,7 @@ def test_a_terrain_model_beside_a_local_cloud_is_asked_in_its_own_coordinates(
     crs = rasterio.crs.CRS.from_wkt(
         CRS(LOCAL[raster][0] if raster in LOCAL else raster).to_wkt("WKT1_GDAL")
     )
-    place = rasterio.transform.from_origin(500000, 4649800, 1, 1)
-    profile = {
-        "driver": "GTiff",
-        "height": 40,
-        "width": 40,
-        "count": 1,
-        "dtype": "float32",
-        "crs": crs,
-        "transform": place,
-    }
-    with rasterio.open(tmp_path / "dtm.tif", "w", **profile) as file:
-        file.write(np.full((40, 40), 7.0, np.float32), 1)
+    write_raster(tmp_path / "dtm.tif", np.full((40, 40), 7.0), 500000, 4649800, crs=crs)
     request = parse_crs(LOCAL[cloud][0] if cloud else "EPSG:32633")
     units = find_units(request)
     terrain = read_terrain(tmp_path / "dtm.tif", request, units)

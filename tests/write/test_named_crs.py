@@ -13,6 +13,7 @@ from hiproof.errors import InputError, InputWarning
 from hiproof.evaluate.models import read_models
 from hiproof.read.models.solids import read_solids
 from hiproof.read.outlines.footprints import read_footprints
+from layers import write_layer
 
 CORNERS = np.array([[i, j, k] for k in (0, 6) for i, j in ((0, 0), (10, 0), (10, 10), (0, 10))])
 SHELL = [(0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)]
@@ -157,10 +158,7 @@ def test_footprints_whose_crs_is_unknown_are_taken_to_be_in_that_of_the_clouds(
 
     monkeypatch.setattr(vector_file, "read_vector_file", read_vector_file)
     square = shapely.box(*PLACE[:2], *(PLACE[:2] + 10))
-    pyogrio.raw.write(
-        tmp_path / "a.shp", np.array([square.wkb]), [np.array(["a"])], ["id"],
-        geometry_type="Polygon", crs="EPSG:25832",
-    )  # fmt: skip
+    write_layer(tmp_path / "a.shp", [square], {"id": ["a"]}, "EPSG:25832")
     with pytest.warns(InputWarning, match="names a CRS that PROJ does not know"):
         found = read_footprints(tmp_path / "a.shp", target_crs="EPSG:25832")
     assert found[0].polygon.equals(square)
