@@ -8,6 +8,7 @@ import shapely
 
 from hiproof.city.request import Request
 from hiproof.city.run import reconstruct_area
+from hiproof.errors import InputError
 from hiproof.update.request import UpdateRequest
 from hiproof.update.run import update_area
 from run_records import by_id
@@ -96,6 +97,17 @@ def test_what_lies_bare_on_a_slope_is_lost(slope, tmp_path):
     kinds = {id: take_kind(row) for id, row in after.items()}
     expected = {"house-1": "unchanged"} | dict.fromkeys(KEPT, "part_removed")
     assert kinds == expected | {"house-3": "demolished"}
+
+
+def test_a_survey_of_bare_ground_alone_is_used_where_its_classes_hold(run, tmp_path):
+    town = make_town(seed=7, density=8.0)
+    for id in town.footprints:
+        lay_bare(town, id, 0.0)
+    town.classification[:] = 2
+    with pytest.raises(InputError, match="update a run with --roofs class"):
+        update(run, tmp_path / "out", town)
+    after = update(run, tmp_path / "bare", town, {"read": {"roofs": "class"}})
+    assert {take_kind(row) for row in after.values()} == {"demolished"}
 
 
 def lay_corner_bare(town, id, size):

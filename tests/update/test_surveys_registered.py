@@ -207,6 +207,20 @@ def test_a_tilt_is_seen_and_counts_as_noise(seed, has_ground):
         tilted.warn("survey of 2024-05-01")
 
 
+@pytest.mark.parametrize("share", [0.0, 0.3])
+@pytest.mark.parametrize("seed", range(5))
+def test_ground_that_moved_under_a_part_of_a_town_is_no_tilt(seed, share):
+    """A tilt counts as noise, under which smaller changes would not be found."""
+    samples = draw_samples(seed, draw_rises(seed, 24, share))
+    samples = [
+        s._replace(ground=s.ground + [0, 0, 0.6 * (s.roof.frame.origin[0] < SIDE_M / 2), 0, 0])
+        for s in samples
+    ]
+    found = register_surveys(samples, READ)
+    assert found.tilt == 0.0
+    assert found.noise.roof < 0.06
+
+
 def test_what_a_shift_rests_on_is_said():
     found = register_surveys(draw_samples(6, draw_rises(6, 10, 0.3)), READ)
     assert found.rests_on == "the ground at 10 places and 7 of 10 sampled roofs"

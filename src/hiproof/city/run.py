@@ -121,7 +121,8 @@ class Steps:
     """The steps in which a reconstruction and an update differ.
 
     `before` is called with the plan, the executor and the progress before tiles are solved, and
-    `make_head` with the plan before their buildings are joined.
+    `make_head` with the plan before their buildings are joined. With `may_be_bare` no point has to
+    be of a building.
     """
 
     make_plan: Callable[[Any, Progress], WorkPlan] = make_plan
@@ -129,6 +130,7 @@ class Steps:
     sort_cloud: Callable[..., Any] = sort_cloud
     before: Callable[[WorkPlan, Any, Progress], None] = lambda *_: None
     make_head: Callable[[WorkPlan], FileHead] = lambda plan: plan.head
+    may_be_bare: bool = False
 
 
 def reconstruct_in_folder(
@@ -151,7 +153,7 @@ def reconstruct_in_folder(
         clock.lap("prepare")
         queue = Queue(plan, state, ledger, executor, request.clouds, request.terrain, progress)
         queue.work_off("sort", steps.sort_cloud)
-        refuse_without_points(plan, ledger)
+        refuse_without_points(plan, ledger, steps.may_be_bare)
         clock.lap("sort")
         if ledger.open_tasks("solve"):
             steps.before(plan, executor, progress)
@@ -208,10 +210,10 @@ class Clock:
         self.seconds[step], self.start = round(current - self.start, 3), current
 
 
-def refuse_without_points(plan: WorkPlan, ledger: Ledger) -> None:
+def refuse_without_points(plan: WorkPlan, ledger: Ledger, may_be_bare: bool) -> None:
     """Raise InputError when no file holds usable points.
 
-    None could be read, or none holds a point of the building classes.
+    None could be read, or none holds a point of the building classes unless it `may_be_bare`.
 
     A run that goes on is past the second: it may have read a few runs of points alone, near what it
     does again.
@@ -224,7 +226,7 @@ def refuse_without_points(plan: WorkPlan, ledger: Ledger) -> None:
             if len(failed) == 1
             else f"none of the {len(tasks)} point files could be read; first: {failed[0]}"
         )
-    if ledger.counts("status"):
+    if may_be_bare or ledger.counts("status"):
         return
     classes: Counter[int] = Counter()
     for task in tasks:

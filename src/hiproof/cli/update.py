@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..log import Level, console_level
+from ..log import Level, console_level, count_things
 from ..progress import show_progress
 from .running import print_faults, print_files
 
@@ -73,7 +73,8 @@ def update(
 def print_update(summary: UpdateSummary) -> None:
     """Print what changed, how the surveys lie to each other, and the files."""
     counts = ", ".join(f"{n:,} {name}" for name, n in summary.by_change.items())
-    click.echo(click.style(f"{summary.run.buildings:,} buildings: {counts}", bold=True))
+    buildings = count_things(summary.run.buildings, "building")
+    click.echo(click.style(f"{buildings}: {counts}", bold=True))
     if summary.by_kind:
         click.echo(
             "largest change of each: "

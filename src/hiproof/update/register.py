@@ -25,6 +25,7 @@ from ..city.plan.registration import SAMPLE_CELL_M, hash_cell
 from ..city.plan.work_plan import WorkPlan
 from ..errors import InputWarning, SettingsError
 from ..geometry.thin import hashes
+from ..log import count_things
 from ..model import Roof
 from ..settings import ReadSettings
 from .cells import (
@@ -143,8 +144,9 @@ class SurveyShift:
     @property
     def rests_on(self) -> str:
         """What the shift rests on, in words."""
-        roofs = f"{self.agreeing} of {self.roofs} sampled roofs"
-        return f"the ground at {self.places} places and {roofs}" if self.places else roofs
+        roofs = f"{self.agreeing} of {count_things(self.roofs, 'sampled roof')}"
+        places = count_things(self.places, "place")
+        return f"the ground at {places} and {roofs}" if self.places else roofs
 
     def to_dict(self) -> dict[str, Any]:
         """Return the shift for JSON."""
@@ -273,6 +275,7 @@ def register_surveys(samples: Iterable[SampledRoof], read: ReadSettings) -> Surv
     rises = [measure_level(sample.ground, shift) - shift[2] for sample, _ in pairs]
     is_moved = (np.abs(rises) > SAME_HEIGHT_M) & (np.abs(offsets - rises) < SAME_HEIGHT_M)
     is_moved &= [len(sample.ground) > 0 for sample, _ in pairs]
+    roofs = place_roofs(pairs, offsets)
     result = SurveyShift(
         tuple(np.round(shift, 4).tolist()),
         tuple(np.round(sigma, 4).tolist()),
@@ -282,7 +285,7 @@ def register_surveys(samples: Iterable[SampledRoof], read: ReadSettings) -> Surv
         round(level, 4),
         sum(repeats_points(sample) for sample, _ in pairs),
         int(is_moved.sum()),
-        measure_tilt(ground if len(ground) else place_roofs(pairs, offsets)[is_agreeing]),
+        measure_tilt(ground, roofs) if len(ground) else measure_tilt(roofs[is_agreeing], roofs),
     )
     areas = np.array([sample.roof.outline.area for sample, _ in pairs])
     if fixed is None:
@@ -325,14 +328,15 @@ def place_roofs(pairs: list[tuple[SampledRoof, Any]], off: np.ndarray) -> np.nda
     return np.column_stack([origins, off])
 
 
-def measure_tilt(places: np.ndarray) -> float:
+def measure_tilt(places: np.ndarray, roofs: np.ndarray) -> float:
     """Return by how much (m) heights at `places` (n, 3 or more) rise across them.
 
-    It is 0 where that is unclear.
+    It is 0 where that is unclear, or where `roofs` (m, 3) do not lean alike: then the ground moved.
 
     >>> x, y = np.meshgrid(np.arange(5) * 50.0, np.arange(5) * 50.0)
-    >>> measure_tilt(np.column_stack([x.ravel(), y.ravel(), 0.002 * x.ravel()]))
-    0.4
+    >>> places = np.column_stack([x.ravel(), y.ravel(), 0.002 * x.ravel()])
+    >>> measure_tilt(places, places - [0, 0, 0.2]), measure_tilt(places, places * [1, 1, 0])
+    (0.4, 0.0)
     """
     if len(places) < FEWEST_TILT_PLACES:
         return 0.0
@@ -347,6 +351,10 @@ def measure_tilt(places: np.ndarray) -> float:
         scatter = max(1.4826 * float(np.median(np.abs(misfit))), LEAST_M / 2)
         weight = np.maximum(1 - (misfit / (4 * scatter)) ** 2, 0.0) ** 2
     rise = float(np.ptp(xy @ plane[:2]))
+    leaning = (roofs[:, :2] - places[:, :2].mean(axis=0)) @ plane[:2]
+    misfits = [np.minimum(np.abs(roofs[:, 2] - z), SHIFT_SCALE_M) for z in (leaning, 0.0)]
+    if misfits[0].sum() > misfits[1].sum():
+        return 0.0
     covariance = scatter**2 * np.linalg.inv(normal)[:2, :2]
     sigmas = math.sqrt(plane[:2] @ np.linalg.solve(covariance, plane[:2]))
     return round(rise, 4) if rise > LEAST_TILT_M and sigmas > TILT_SIGMAS else 0.0

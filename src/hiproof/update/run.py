@@ -108,7 +108,8 @@ def update_area(
         update = UpdateHead(date, tuple(load_roofs_outside(state)))
         return dataclasses.replace(plan.head, update=update)
 
-    steps = Steps(make_plan, update_tile, sort_survey, prepare, make_head)
+    may_be_bare = settings.read.roofs == "class"  # where all was pulled down
+    steps = Steps(make_plan, update_tile, sort_survey, prepare, make_head, may_be_bare)
     with hold_folder(state), collect_rarely():
         summary = reconstruct_in_folder(request, state, progress, steps)
         remove_earlier_points(state)

@@ -52,7 +52,8 @@ def settle_classes(clouds: tuple[str, ...], settings: Settings) -> Settings:
     if not selected_counts:
         raise InputError(
             f"expected points that may be roofs, got classes {present}, all of them ground, water, "
-            "noise, low vegetation or bridges; say which class holds roofs with --building-class"
+            "noise, low vegetation or bridges; say which class holds roofs with --building-class, "
+            "or update a run with --roofs class where no building stands any more"
         )
     if read.roofs == "auto":
         warnings.warn(
