@@ -207,6 +207,14 @@ def test_broken_file_raises_a_sentence(tmp_path, name):
         list(read_solids(write_text(tmp_path, name, text)))
 
 
+@pytest.mark.parametrize("name", ["a.city.json", "a.city.jsonl"])
+def test_marks_of_the_encoding_are_no_damage(name, tmp_path):
+    """Editors begin files with one, and joined files have more."""
+    text = "\n".join("\ufeff" + line for line in FILES[name].split("\n") if line)
+    ((id, _),) = read_solids(write_text(tmp_path, name, text))
+    assert id == "house"
+
+
 def test_missing_and_binary_files_raise_a_sentence(tmp_path):
     with pytest.raises(
         InputError, match=r"got the folder .*; name one in it, such as buildings\.city\.jsonl"

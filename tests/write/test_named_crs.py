@@ -81,11 +81,15 @@ ADV = {
     "urn:adv:crs:ETRS89_UTM33*DE_DHHN92_NH": "EPSG:25833+5783",
     "urn:adv:crs:ETRS89_UTM32": "EPSG:25832",
     "urn:adv:crs:DE_DHDN_3GK3": "EPSG:31467",
+    "http://www.opengis.net/gml/srs/epsg.xml#25832": "EPSG:25832",
+    "EPSG::31467": "EPSG:31467",
+    "http://www.opengis.net/def/crs-compound?1=http://www.opengis.net/def/crs/EPSG/0/25832&amp;"
+    "2=http://www.opengis.net/def/crs/EPSG/0/5783": "EPSG:25832+5783",
 }
 
 
 @pytest.mark.parametrize("name", ADV)
-def test_names_of_german_authorities_are_understood(name, tmp_path):
+def test_names_that_proj_does_not_read_are_understood(name, tmp_path):
     run = hiproof.open_run(write_gml(tmp_path / "a.gml", name))
     assert run.crs == hiproof.read.parse_crs(ADV[name])
 

@@ -52,9 +52,8 @@ class FileHead:
         """Units of the coordinates in each file, and the way to its CRS."""
         from ..read.crs import find_units, parse_crs
 
-        return FileUnits.of(
-            self.crs, find_units(parse_crs(self.crs), unit_name=self.unit), self.write.out_crs
-        )
+        units = find_units(parse_crs(self.crs), "the models", self.unit)
+        return FileUnits.of(self.crs, units, self.write.out_crs)
 
     @functools.cached_property
     def crs_of_files(self) -> Any:

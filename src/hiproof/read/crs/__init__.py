@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import re
 import warnings
 from dataclasses import dataclass
 from typing import Any
@@ -36,6 +37,12 @@ ADV_NAMES = {
     "DE_DHHN2016_NH": 7837,
 }
 
+# Names by EPSG codes that PROJ does not read: of GML 3.1, of plan and heights, without a version.
+EPSG_NAME = re.compile(
+    r"https?://\S*(?:epsg\.xml#\d+|/def/crs-compound\?\S+)|EPSG::\d+", re.IGNORECASE
+)
+EPSG_CODE = re.compile(r"(?:epsg\.xml#|/EPSG/[^/&]*/|EPSG::)(\d+)", re.IGNORECASE)
+
 
 @dataclass(frozen=True)
 class UnknownCRS:
@@ -47,8 +54,8 @@ class UnknownCRS:
 def parse_crs(value: Any) -> CRS | None:
     """Return the pyproj CRS of an EPSG number, "EPSG:7415", WKT or a CRS.
 
-    Names of the German surveying authorities are understood, too. None and "" stay None. Raises
-    InputError otherwise.
+    Names of the German surveying authorities and those of GML 3.1 are understood, too. None and ""
+    stay None. Raises InputError otherwise.
 
     >>> parse_crs("EPSG:28992").to_epsg()
     28992
@@ -58,7 +65,7 @@ def parse_crs(value: Any) -> CRS | None:
     if value is None or (isinstance(value, str) and not value.strip()):
         return None
     try:
-        return CRS.from_user_input(translate_adv(value) if isinstance(value, str) else value)
+        return CRS.from_user_input(translate_name(value) if isinstance(value, str) else value)
     except CRSError as error:
         text = str(value)[:60]
         raise InputError(
@@ -68,8 +75,14 @@ def parse_crs(value: Any) -> CRS | None:
         ) from error
 
 
-def translate_adv(name: str) -> str:
-    """Return the EPSG codes of a name of the German surveying authorities, else the name."""
+def translate_name(name: str) -> str:
+    """Return the EPSG codes of a name that PROJ does not read, else the name.
+
+    >>> translate_name("http://www.opengis.net/gml/srs/epsg.xml#31467")
+    'EPSG:31467'
+    """
+    if EPSG_NAME.fullmatch(name.strip()):
+        return "EPSG:" + "+".join(EPSG_CODE.findall(name))
     parts = name.strip().removeprefix("urn:adv:crs:").split("*")
     codes = [ADV_NAMES.get(part) for part in parts]
     return name if None in codes else "EPSG:" + "+".join(map(str, codes))

@@ -274,7 +274,8 @@ def parsed_line(line: str, place: str, seen_header: bool) -> dict[str, Any]:
 def parse_object(text: str, place: str) -> dict[str, Any]:
     """Parse a JSON object. Raises InputError naming the place."""
     try:
-        value = json.loads(text, parse_constant=refuse_constant)
+        # Editors may begin a file with a mark of the encoding, and files are joined.
+        value = json.loads(text.lstrip("\ufeff"), parse_constant=refuse_constant)
     # A ValueError too for numbers of thousands of digits.
     except (ValueError, RecursionError) as error:
         if text.lstrip("\ufeff \t\r\n").startswith("<"):
@@ -307,6 +308,8 @@ def read_text(path: Path) -> str:
 def unreadable(path: Path, error: Exception) -> InputError:
     """Make the error for a file that is missing or whose bytes are no text."""
     text = "none" if isinstance(error, FileNotFoundError) else f"one that is not: {error}"
+    if isinstance(error, UnicodeDecodeError):
+        text = "one that is not in UTF-8"
     return InputError(f"expected a readable text file at {path}, got {text}; check the path")
 
 
