@@ -67,6 +67,11 @@ def spoil(hours=slice(None), **factors):
     return change
 
 
+def make_overcast(columns):
+    """Call all radiation diffuse, as in files made of the global one alone."""
+    columns["dhi"][:], columns["dni"][:] = columns["ghi"], 0.0
+
+
 @pytest.mark.parametrize(
     "change, reason",
     [
@@ -85,6 +90,7 @@ def spoil(hours=slice(None), **factors):
         (spoil(**dict.fromkeys(("ghi", "dhi", "dni"), 0)), "got only 0.0% of what reaches the atm"),
         (spoil(**dict.fromkeys(("ghi", "dhi", "dni"), lambda v: v / 1000)), "got only 0.0% of wha"),
         (spoil(slice(4800, 5544), ghi=0, dhi=0, dni=0), "got 31 days without radi.*on 20 July"),
+        (make_overcast, "got hardly any direct radiation in a year"),
         (spoil(ghi=lambda v: np.roll(v, 1)), "beyond what reaches the atmosphere at its hours"),
         (
             lambda columns: columns["stamps"].__setitem__(9, columns["stamps"][8]),

@@ -40,6 +40,7 @@ share of the year: 0.003 in pvlib's TMY3 files, 0.06 where hours are half of one
 """
 GREATEST_GAP_WM2 = 300.0  # of either in one hour (W/m2); up to 250 where hours are one off
 LEAST_CLEARNESS = 0.1  # of the radiation above the atmosphere: 0.3 in the dullest climates on Earth
+LEAST_DIRECT = 0.05  # of a year's global radiation: a third in dull climates, 0 in no climate
 BRIGHTEST, LEAST_BRIGHTNESS = 0.99, 0.5
 """Quantile of the hours with a high sun, and the share of the radiation above the atmosphere that
 it has to reach: clear skies let 0.7 to 0.8 pass, and every climate has clear hours.
@@ -227,6 +228,8 @@ def refuse_other_sun(weather: Weather, path: str) -> None:
         got = f"diffuse and direct radiation {gaps.sum() / total:.0%} off the global"
     elif share < LEAST_CLEARNESS:
         got = f"only {share:.1%} of what reaches the atmosphere in a year"
+    elif dhi.sum() > (1 - LEAST_DIRECT) * total:
+        got = "hardly any direct radiation in a year"
     elif is_dark.any():
         day = weather.times[24 * int(is_dark.argmax())]
         got = (
