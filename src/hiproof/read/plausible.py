@@ -20,7 +20,8 @@ MOST_HEIGHT = 1e6  # largest height, in the input's unit: Everest has 29,032 fee
 # lower. Codes for "no data" such as -9999, 9999 and -32767 lie beyond, also in decimetres and feet.
 LOWEST_LAND_M, HIGHEST_LAND_M = -600.0, 9000.0
 
-HIGHEST_BUILDING_M = 1000.0  # highest building (m above its ground): the Burj Khalifa has 828
+# Highest building (m above its ground): the Burj Khalifa has 828, and 999 is a code for "no data".
+HIGHEST_BUILDING_M = 900.0
 
 
 class Implausible(ValueError):
