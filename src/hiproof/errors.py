@@ -70,6 +70,12 @@ def is_interrupt(error: BaseException) -> bool:
     return isinstance(cause, KeyboardInterrupt)
 
 
+def raise_interrupt(error: BaseException) -> None:
+    """Raise a Ctrl-C in disguise as what it is."""
+    if is_interrupt(error):
+        raise KeyboardInterrupt from error
+
+
 class ErrorReport(NamedTuple):
     """The record of an unexpected error: one line with its place in the code, the traceback."""
 
@@ -81,8 +87,7 @@ def report_error(error: Exception) -> ErrorReport:
     """Describe one building's own error; MemoryError and Ctrl-C, which are not, are raised."""
     if isinstance(error, MemoryError):
         raise error
-    if is_interrupt(error):
-        raise KeyboardInterrupt from error
+    raise_interrupt(error)
     place = traceback.extract_tb(error.__traceback__)[-1]
     detail = f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})"
     return ErrorReport(detail, "".join(traceback.format_exception(error)))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
-import traceback
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -17,7 +16,7 @@ import numpy as np
 import shapely
 
 from .. import __version__
-from ..errors import HiproofError, InputError, OutputError, is_interrupt
+from ..errors import HiproofError, InputError, OutputError, report_error
 from ..evaluate.run import list_run_inputs, run_record
 from ..formats import list_model_paths, list_requested_files
 from ..log import LOGGER
@@ -148,14 +147,8 @@ class Maker:
             return fragments(build(record, self.head.compose), names, self.head)
         except HiproofError as error:
             reason, status = str(error), Status.NOT_BUILT
-        except MemoryError:
-            raise
         except Exception as error:
-            if is_interrupt(error):
-                raise KeyboardInterrupt from error
-            place = traceback.extract_tb(error.__traceback__)[-1]
-            reason = f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})"
-            status = Status.INTERNAL_ERROR
+            reason, status = report_error(error).detail, Status.INTERNAL_ERROR
         building = Building(id, status, mask(reason))
         building, texts = fragments(building, names, self.head)
         selection = finite({**record, "status": status.code, "detail": building.detail})

@@ -18,7 +18,7 @@ from itertools import product
 import numpy as np
 import shapely
 
-from ...errors import InputWarning, is_interrupt
+from ...errors import InputWarning, raise_interrupt
 from ...fit.registration import (
     FARTHEST_SHIFT_M,
     LEAST_FOOTPRINTS,
@@ -251,8 +251,7 @@ def readable_chunks(path: str, cells: list[Cell], units: Units) -> Iterator[Poin
         except MemoryError:
             raise
         except Exception as error:
-            if is_interrupt(error):
-                raise KeyboardInterrupt from error
+            raise_interrupt(error)
 
 
 def read_chunks(path: str, cells: list[Cell], units: Units) -> Iterable[Iterator[PointCloud]]:

@@ -28,7 +28,7 @@ import numpy as np
 import shapely
 
 from ... import __version__
-from ...errors import ErrorReport, InputError, is_interrupt
+from ...errors import ErrorReport, InputError, raise_interrupt
 from ...log import LOGGER
 from ...masking import mask, masked_values
 from ...model import Footprint
@@ -122,8 +122,7 @@ def keep_failure(
             if len(bundles_in(root.parent)) > MOST_BUNDLES:  # another process was faster
                 shutil.rmtree(folder)
     except Exception as error:
-        if is_interrupt(error):
-            raise KeyboardInterrupt from error
+        raise_interrupt(error)
         LOGGER.warning(
             "the input of building %s could not be kept in %s: %s", job.id, FAILURES_FOLDER, error
         )

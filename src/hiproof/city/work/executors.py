@@ -24,7 +24,7 @@ from urllib.parse import urlsplit
 
 from ...compiled import news
 from ...compiled.stamp import count_compiled
-from ...errors import InputError, OutputError, is_interrupt
+from ...errors import InputError, OutputError, raise_interrupt
 from ...extras import import_extra
 from .tasks import TaskOutcome, WorkerLost, make_ready
 
@@ -50,8 +50,7 @@ class InProcess:
             try:
                 yield task, function(*task), None
             except Exception as error:
-                if is_interrupt(error):
-                    raise KeyboardInterrupt from error
+                raise_interrupt(error)
                 yield task, None, error
 
     def isolate(self) -> Executor:

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 import shapely
 
-from ...errors import OutputError, is_interrupt
+from ...errors import OutputError, raise_interrupt
 from ...frames import Units
 from ...geometry.point_grid import PointGrid
 from ...model import PointCloud
@@ -243,8 +243,7 @@ def sort_cloud(
     except Exception as error:
         for written in gatherer.folder.glob(f"*/{number}-*.npz"):  # of this file
             written.unlink(missing_ok=True)
-        if is_interrupt(error):
-            raise KeyboardInterrupt from error
+        raise_interrupt(error)
         raise as_input_error(error, address) from error
     gatherer.flush()
     if result:
