@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import shapely
@@ -44,7 +44,9 @@ from hiproof.simulate.scene import (
 from .tables import FigureTable, make_parser
 
 AROUND_M = 9.0  # of ground that is scanned around a footprint
+GROUND_NOISE_M = 0.03  # of ground seen inside a footprint
 WRONG_CLASS = 0.03  # share of roof and ground points that have another class
+LOST = replace(Defects.none(), missing_strip=0.7, partial=0.7, swath_edge=0.3, outliers=0.01)
 
 
 @dataclass
@@ -115,22 +117,8 @@ def make_plain_site(
 ) -> Site:
     size, eave_m, rise = draw_house(rng, eave)
     footprint, ground = shapely.box(0, 0, *size), draw_slope(rng, steep)
-    return Site(
-        footprint,
-        footprint,
-        [make_house_body((0, 0, *size), eave_m, rise, ground)],
-        slope=ground,
-        **more,
-    )
-
-
-def make_thinned_site(rng: np.random.Generator) -> Site:
-    return make_plain_site(
-        rng,
-        defects=Defects(
-            0, 0, 0, 0, 0, missing_strip=0.7, partial=0.7, swath_edge=0.3, outliers=0.01
-        ),
-    )
+    body = make_house_body((0, 0, *size), eave_m, rise, ground)
+    return Site(footprint, footprint, [body], slope=ground, **more)
 
 
 def make_dormer_site(rng: np.random.Generator) -> Site:
@@ -150,12 +138,11 @@ def sink_points(site: Site, area: shapely.Geometry, share: float) -> Site:
     def change(rng: np.random.Generator, scan: Scan) -> Scan:
         inside = shapely.intersects_xy(area, *scan.points[:, :2].T) & (scan.source == SOURCE_ROOF)
         is_through = inside & (rng.random(len(scan)) < share)
-        points, source = scan.points.copy(), scan.source.copy()
-        points[is_through, 2] = site.slope.height_at(points[is_through, :2]) + rng.normal(
-            0, 0.03, is_through.sum()
-        )
-        source[is_through] = SOURCE_GROUND
-        return Scan(points, scan.label, source)
+        points = scan.points.copy()
+        noise = rng.normal(0, GROUND_NOISE_M, is_through.sum())
+        points[is_through, 2] = site.slope.height_at(points[is_through, :2]) + noise
+        source = np.where(is_through, SOURCE_GROUND, scan.source)
+        return replace(scan, points=points, source=source)
 
     site.change = change
     return site
@@ -198,13 +185,10 @@ def add_ground(site: Site, area: shapely.Geometry, share: float) -> Site:
         is_above = shapely.intersects_xy(area, *scan.points[:, :2].T) & (scan.source == SOURCE_ROOF)
         ground = scan.select(is_above & (rng.random(len(scan)) < share))
         xy = ground.points[:, :2] + rng.normal(0, 0.3, (len(ground), 2))
-        points = np.column_stack([xy, site.slope.height_at(xy) + rng.normal(0, 0.03, len(xy))])
+        z = site.slope.height_at(xy) + rng.normal(0, GROUND_NOISE_M, len(xy))
+        points = np.concatenate([scan.points, np.column_stack([xy, z])])
         source = np.concatenate([scan.source, np.full(len(ground), SOURCE_GROUND, np.int8)])
-        return Scan(
-            np.concatenate([scan.points, points]),
-            np.concatenate([scan.label, ground.label]),
-            source,
-        )
+        return Scan(points, np.concatenate([scan.label, ground.label]), source)
 
     site.change = change
     return site
@@ -274,11 +258,8 @@ def make_green_roof_site(rng: np.random.Generator) -> Site:
 
     def change(rng: np.random.Generator, scan: Scan) -> Scan:
         roof = scan.source == SOURCE_ROOF
-        return Scan(
-            scan.points + np.outer(roof * rng.exponential(0.15, len(scan)), (0, 0, 1)),
-            scan.label,
-            scan.source,
-        )
+        plants = np.outer(roof * rng.exponential(0.15, len(scan)), (0, 0, 1))
+        return replace(scan, points=scan.points + plants)
 
     site.change = change
     return site
@@ -286,12 +267,8 @@ def make_green_roof_site(rng: np.random.Generator) -> Site:
 
 def make_block_site(rng: np.random.Generator) -> Site:
     """Make a closed block of houses around a yard of 1/3 to 2/3 of its plan."""
-    (w, h), deep, ground, eave = (
-        rng.uniform(24.0, 40.0, 2),
-        rng.uniform(4.0, 9.0),
-        draw_slope(rng),
-        rng.uniform(4.0, 9.0),
-    )
+    (w, h), deep = rng.uniform(24.0, 40.0, 2), rng.uniform(4.0, 9.0)
+    ground, eave = draw_slope(rng), rng.uniform(4.0, 9.0)
     rows = [
         (0, 0, w, deep),
         (0, h - deep, w, h),
@@ -300,9 +277,8 @@ def make_block_site(rng: np.random.Generator) -> Site:
     ]
     footprint = shapely.box(0, 0, w, h)
     bodies = [make_house_body(rect, eave, rng.choice([0.0, 2.0]), ground) for rect in rows]
-    return Site(
-        footprint, footprint - shapely.box(deep, deep, w - deep, h - deep), bodies, slope=ground
-    )
+    yard = shapely.box(deep, deep, w - deep, h - deep)
+    return Site(footprint, footprint - yard, bodies, slope=ground)
 
 
 YARDS = {
@@ -312,7 +288,7 @@ YARDS = {
 YARDS["yard of a block"] = make_block_site
 SOUND = {
     "plain": make_plain_site,
-    "lost points": make_thinned_site,
+    "lost points": lambda rng: make_plain_site(rng, defects=LOST),
     "dormers": make_dormer_site,
     "glass roof": make_glass_site,
     "passage": make_passage_site,
@@ -401,14 +377,10 @@ def make_cells(make: Callable, key: int, density: float, seeds: range) -> list[s
         for way, look in WAYS.items():
             verdict = look(site, scan, rng)
             is_cut = not verdict.is_empty and verdict.outline.area < 0.999 * site.footprint.area
-            shifted = (
-                0.0
-                if verdict.is_empty or site.true.is_empty
-                else abs(verdict.outline.area / site.true.area - 1)
-            )
-            outcomes[way].append(
-                (verdict.is_empty or verdict.remark == "no points", is_cut, shifted)
-            )
+            is_known = not verdict.is_empty and not site.true.is_empty
+            shifted = abs(verdict.outline.area / site.true.area - 1) if is_known else 0.0
+            is_gone = verdict.is_empty or verdict.remark == "no points"
+            outcomes[way].append((is_gone, is_cut, shifted))
     text = []
     for rows in outcomes.values():
         empty, cut, shifted = np.array(rows, float).T

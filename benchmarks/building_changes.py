@@ -95,26 +95,18 @@ def put_block(
 ) -> Part | None:
     """Return a level block on a part, `height` (m) over the highest roof below, or None."""
     p = part.parameters
-    if (
-        "width" not in p
-        or size[0] + EDGE_MARGIN_M > p["length"]
-        or size[1] + EDGE_MARGIN_M > p["width"]
-    ):
+    if "width" not in p:
         return None
-    room = np.array([p["length"] - size[0], p["width"] - size[1]]) / 2 - EDGE_MARGIN_M / 2
+    room = (np.array([p["length"], p["width"]]) - size - EDGE_MARGIN_M) / 2
+    if (room < 0).any():
+        return None
     u, v = rng.uniform(-room, room)
     c, s = math.cos(part.kappa), math.sin(part.kappa)
     xy = part.translation[:2] + np.array([c * u - s * v, s * u + c * v])
-    outline = (
-        make_part("flat", {"length": size[0], "width": size[1]}, part.kappa, np.array([*xy, 0.0]))
-        .pieces[0]
-        .outline
-    )
-    corners = np.vstack([shapely.get_coordinates(outline), xy[None]])
-    top = max(float(piece.height_at(corners).max()) for piece in part.pieces) + height
-    return make_part(
-        "flat", {"length": size[0], "width": size[1]}, part.kappa, np.array([*xy, top])
-    )
+    sides = {"length": size[0], "width": size[1]}
+    block = make_part("flat", sides, part.kappa, np.array([*xy, 0.0]))
+    corners = np.vstack([shapely.get_coordinates(block.pieces[0].outline), xy[None]])
+    return lift(block, max(piece.height_at(corners).max() for piece in part.pieces) + height)
 
 
 def add_part(rng: np.random.Generator, building: SimBuilding) -> list[Part] | None:
@@ -122,9 +114,8 @@ def add_part(rng: np.random.Generator, building: SimBuilding) -> list[Part] | No
     part = building.largest
     if part.type != "flat":
         return None
-    block = put_block(
-        rng, part, (rng.uniform(4.5, 8.0), rng.uniform(3.5, 5.5)), rng.uniform(0.8, 3.0)
-    )
+    size = (rng.uniform(4.5, 8.0), rng.uniform(3.5, 5.5))
+    block = put_block(rng, part, size, rng.uniform(0.8, 3.0))
     return None if block is None else [*building.roof.parts, block]
 
 

@@ -62,6 +62,7 @@ from .towns import TOWNS, read_town
 
 SHARES = (1.0, 0.5, 0.25, 0.125)  # Shares of the points of real clouds.
 TOWN_DENSITIES = (2.0, 8.0)  # points/m2
+CORNER = np.array([100000.0, 450000.0, 10.0])  # of roofs that are laid out
 MOST_TOLD = 5  # Tracebacks and other findings printed a run.
 
 
@@ -190,10 +191,9 @@ def judge_scene(task: tuple[int, int, Path]) -> Findings:
     folder = work / f"scene-{seed}"
     try:
         findings = judge_run(f"seed {seed}", write_scene(seed, count, folder))
-        if (folder / "run" / "failures").exists():  # `hiproof repro` runs them again
-            shutil.copytree(
-                folder / "run" / "failures", work / "failures" / f"seed-{seed}", dirs_exist_ok=True
-            )
+        failures = folder / "run" / "failures"
+        if failures.exists():  # `hiproof repro` runs them again
+            shutil.copytree(failures, work / "failures" / f"seed-{seed}", dirs_exist_ok=True)
         return findings
     finally:
         shutil.rmtree(folder, ignore_errors=True)
@@ -222,21 +222,16 @@ def list_real_runs(data: Path, work: Path) -> Iterator[tuple[str, Callable[[], R
             for outlines in dict.fromkeys([footprints and str(data / footprints), None]):
                 suffix = "with" if outlines else "without"
                 name = f"{folder}, {share:g} of the points, {suffix} footprints"
-                yield (
-                    name,
-                    partial(
-                        request_thinned_run, data / folder, share, outlines, settings, work / folder
-                    ),
-                )
+                given = (data / folder, share, outlines, settings, work / folder)
+                yield name, partial(request_thinned_run, *given)
 
 
 def request_thinned_run(
     folder: Path, share: float, footprints: str | None, settings: Settings, work: Path
 ) -> Request:
     """Return the run over a share of the points of all files in `folder`."""
-    clouds = [
-        str(thin_file(path, share, work / "thinned")) for path in sorted(folder.glob("*.laz"))
-    ]
+    thinned = work / "thinned"
+    clouds = [str(thin_file(path, share, thinned)) for path in sorted(folder.glob("*.laz"))]
     out = work / f"{share:g}-{'with' if footprints else 'without'}-footprints"
     return Request(tuple(clouds), out, footprints, settings=settings, restart=True)
 
@@ -259,11 +254,8 @@ def list_roof_runs(data: Path, work: Path) -> Iterator[tuple[str, Callable[[], R
         yield "real roofs", partial(request_roofs_run, data, work / "real-roofs")
     for town, path in TOWNS.items():
         for density in TOWN_DENSITIES if path.exists() else ():
-            folder = work / f"{town}-{density:g}"
-            yield (
-                f"{town} at {density:g} points/m2",
-                partial(request_town_run, path, density, folder),
-            )
+            make = partial(request_town_run, path, density, work / f"{town}-{density:g}")
+            yield f"{town} at {density:g} points/m2", make
 
 
 def request_roofs_run(data: Path, folder: Path) -> Request:
@@ -295,12 +287,8 @@ def lay_out(clouds: list[np.ndarray], folder: Path) -> Request:
     columns = int(np.ceil(np.sqrt(len(clouds))))
     moved = []
     for number, cloud in enumerate(clouds):
-        place = np.array([*np.multiply(divmod(number, columns), extent), 0.0]) + [
-            100000.0,
-            450000.0,
-            10.0,
-        ]
-        moved.append(cloud - [*cloud[:, :2].min(axis=0), cloud[:, 2].min()] + place)
+        place = CORNER + [*np.multiply(divmod(number, columns), extent), 0.0]
+        moved.append(cloud - cloud.min(axis=0) + place)
     points = np.concatenate(moved)
     write_cloud(folder / "cloud.laz", points, np.full(len(points), 6, np.uint8))
     return Request((str(folder / "cloud.laz"),), folder / "run", restart=True)

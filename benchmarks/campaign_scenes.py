@@ -94,11 +94,8 @@ def write_scene(seed: int, count: int, folder: Path) -> Request:
     folder.mkdir(parents=True, exist_ok=True)
     cloud, footprints = folder / "cloud.laz", folder / "footprints.gpkg"
     sources = np.concatenate([building.source for building in buildings])
-    write_cloud(
-        cloud,
-        np.concatenate([b.points for b in buildings]),
-        classify(sources, settings.has_classes),
-    )
+    points = np.concatenate([building.points for building in buildings])
+    write_cloud(cloud, points, classify(sources, settings.has_classes))
     if settings.has_footprints:
         write_footprints(footprints, buildings)
     return Request(
@@ -114,16 +111,12 @@ def place_building(seed: int, number: int, settings: SceneSettings) -> Placed:
     """Draw, scan and damage building `number` of the scene `seed`."""
     rng = np.random.default_rng([seed, number])
     row, column = divmod(number - 1, math.isqrt(BUILDINGS_A_SCENE))
-    place = ORIGIN + [
-        column * SPACING_M + rng.uniform(0, 5),
-        row * SPACING_M + rng.uniform(0, 5),
-        rng.uniform(0, 9),
-    ]
+    corner = np.array([column * SPACING_M, row * SPACING_M, 0.0])
+    place = ORIGIN + (corner + rng.uniform(0, (5, 5, 9)))
     building = draw_building(rng, place)
     defects = Defects() if rng.random() < 0.7 else Defects.none()
-    cloud = scan(
-        building, rng, ScanSettings(density=settings.density, defects=defects, margin_m=4.0)
-    )
+    scanner = ScanSettings(density=settings.density, defects=defects, margin_m=4.0)
+    cloud = scan(building, rng, scanner)
     keep = damage_points(rng, cloud.points, building.footprint, settings.damage)
     footprint = damage_footprint(rng, building.footprint, settings.damage)
     return Placed(f"b{number:03d}", cloud.points[keep], cloud.source[keep], footprint)
@@ -191,13 +184,9 @@ def damage_footprint(
         outline = shapely.transform(outline, lambda xy: xy + shift)
     x, y = rng.uniform(*np.reshape(outline.bounds, (2, 2)))
     if rng.random() < damage:
-        outline = shapely.difference(
-            outline, shapely.box(x, y, x + rng.uniform(1, 20), y + rng.uniform(1, 20))
-        )
+        outline -= shapely.box(x, y, x + rng.uniform(1, 20), y + rng.uniform(1, 20))
     if rng.random() < 0.5 * damage:
-        outline = shapely.difference(
-            outline, shapely.Point(x, y).buffer(rng.uniform(0.2, 3.0), quad_segs=3)
-        )
+        outline -= shapely.Point(x, y).buffer(rng.uniform(0.2, 3.0), quad_segs=3)
     if rng.random() < 0.3 * damage:
         outline = shapely.segmentize(outline, rng.uniform(0.1, 1.0))
     if rng.random() < 0.3 * damage:

@@ -99,9 +99,9 @@ def draw_truth(
 def is_large_change(lot: Lot, building) -> bool:
     """Return whether a roof changes by LEAST_M over LEAST_M2 or more."""
     outline = lot.building.outline
-    x0, y0, x1, y1 = outline.bounds
-    x, y = np.meshgrid(np.arange(x0, x1, 0.25), np.arange(y0, y1, 0.25))
-    xy = np.column_stack([x.ravel(), y.ravel()])
+    west, south, east, north = outline.bounds
+    axes = np.meshgrid(np.arange(west, east, 0.25), np.arange(south, north, 0.25))
+    xy = np.stack(axes, axis=-1).reshape(-1, 2)
     heights = [np.nan_to_num(roof.height_at(xy)) for roof in (lot.building.roof, building.roof)]
     return float((np.abs(heights[1] - heights[0]) > LEAST_M).sum()) / 16 >= LEAST_M2
 
@@ -110,7 +110,6 @@ def disturb(rng: np.random.Generator, lot: Lot, kind: str, cloud: Scan) -> Scan:
     """Return the cloud with something over or before a roof that is no change of it."""
     outline = lot.building.footprint
     x0, y0, x1, y1 = outline.bounds
-    top = lot.building.z_ground + 6.0
     inside = shapely.intersects_xy(outline, cloud.points[:, 0], cloud.points[:, 1])
     if not inside.any():
         return cloud
@@ -136,34 +135,37 @@ def disturb(rng: np.random.Generator, lot: Lot, kind: str, cloud: Scan) -> Scan:
     return dataclasses.replace(cloud, points=points)
 
 
+def find_bounds(stock: Stock) -> tuple[float, float, float, float]:
+    """Return the bounds of all lots of a city."""
+    return (*stock.low.min(axis=0), *stock.high.max(axis=0))
+
+
+def find_lots(stock: Stock) -> dict[str, Lot]:
+    """Return all lots of a city by id."""
+    return {lot.id: lot for lot in stock.near(find_bounds(stock))}
+
+
 def write_city(
     folder: Path, seed: int, count: int, densities: tuple[float, float], share: float
 ) -> dict:
     """Write both surveys and footprints of a city; return its truth."""
     city = City(count, seed, densities[0])
     stock = Stock(city)
-    bounds = (*stock.low.min(axis=0), *stock.high.max(axis=0))
-    lots = stock.near(bounds)
+    bounds, by_id = find_bounds(stock), find_lots(stock)
+    lots = list(by_id.values())
     kinds, after, disturbed = draw_truth(seed, lots, share)
     folder.mkdir(parents=True, exist_ok=True)
     write_footprints(folder / "footprints.gpkg", lots)
     first = [lot for lot in lots if kinds.get(lot.id) != "built"]
     second = [after.get(lot.id, lot) for lot in lots if kinds.get(lot.id) != "demolished"]
-    by_id = {lot.id: lot for lot in lots}
     rng = np.random.default_rng([seed, 78])
     for name, some, density, own in (
         ("first", first, densities[0], seed),
         ("second", second, densities[1], seed + 5000),
     ):
-        scans = []
-        for cloud in survey(
-            stock.patches(bounds),
-            some,
-            stock.terrain,
-            city.flight,
-            own,
-            ScanSettings(density=density),
-        ):
+        scans, settings = [], ScanSettings(density=density)
+        patches = stock.patches(bounds)
+        for cloud in survey(patches, some, stock.terrain, city.flight, own, settings):
             if name == "second":
                 for id, kind in disturbed.items():
                     cloud = disturb(rng, by_id[id], kind, cloud)
@@ -199,20 +201,17 @@ def run_city(
 ) -> dict:
     """Return the truth and the answer of a city, with the seconds of run and update."""
     file = folder / "truth.json"
-    truth = (
-        json.loads(file.read_text())
-        if file.exists()
-        else write_city(folder, seed, count, densities, share)
-    )
+    is_written = file.exists()
+    city = (folder, seed, count, densities, share)
+    truth = json.loads(file.read_text()) if is_written else write_city(*city)
     start = time.process_time()
     if not (folder / "models" / "run.json").exists():
         reconstruct_city(folder)
     middle = time.process_time()
     summary = update_city(folder)
     end = time.process_time()
-    stock = Stock(City(count, seed, densities[0]))
-    lots = stock.near((*stock.low.min(axis=0), *stock.high.max(axis=0)))
-    after, by_id = draw_truth(seed, lots, share)[1], {lot.id: lot for lot in lots}
+    by_id = find_lots(Stock(City(count, seed, densities[0])))
+    after = draw_truth(seed, list(by_id.values()), share)[1]
     return {
         "truth": truth,
         "rows": read_changes(folder),
@@ -249,8 +248,7 @@ def measure_refined(
     truth = run_city(folder, seed, count, densities, USUAL_SHARE)["truth"]
     update_city(folder, "refined", refine=True)
     stock = Stock(City(count, seed, densities[0]))
-    lots = stock.near((*stock.low.min(axis=0), *stock.high.max(axis=0)))
-    roofs = {lot.id: lot.building.roof for lot in lots}
+    roofs = {id: lot.building.roof for id, lot in find_lots(stock).items()}
     offset = np.array([0.0, 0.0, measure_height(folder / "first.laz", stock)])
     models = {name: read_models(folder / name) for name in ("models", "refined")}
     changed = truth["kinds"].keys() | truth["disturbed"].keys()
@@ -303,11 +301,8 @@ def score(results: list[dict], is_verbose: bool) -> dict[str, float]:
         for id in truth["ids"]:
             kind, row = truth["kinds"].get(id, NOTHING), rows.get(id)
             found = row is not None and row["class"] in ("changed", "gone", "new")
-            group = (
-                "changed"
-                if kind != NOTHING
-                else ("disturbed" if id in truth["disturbed"] else NOTHING)
-            )
+            is_disturbed = id in truth["disturbed"]
+            group = "changed" if kind != NOTHING else "disturbed" if is_disturbed else NOTHING
             counts[group] += 1
             counts[group + " found"] += found
             counts[group + " uncertain"] += row is not None and row["class"] == "uncertain"
@@ -316,11 +311,8 @@ def score(results: list[dict], is_verbose: bool) -> dict[str, float]:
             if kind == "roof_raised" and found:
                 errors.append(float(row["difference_m"] or "nan") - truth["raised"][id])
             if is_verbose and (found != (kind != NOTHING) or (found and not right)):
-                told = (
-                    (row["class"], row["kind"], row["difference_m"], row["area_m2"])
-                    if row
-                    else None
-                )
+                names = ("class", "kind", "difference_m", "area_m2")
+                told = row and tuple(row[name] for name in names)
                 print(f"    city {k} {id}: {kind} {truth['disturbed'].get(id, '')} -> {told}")
     alarms = counts[NOTHING + " found"] + counts["disturbed found"]
     hits = counts["changed found"]

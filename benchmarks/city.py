@@ -15,6 +15,7 @@ import shutil
 import time
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -74,15 +75,10 @@ def measure_run(
 def run_warm(clouds: list[str], footprints: str, out: Path, jobs: int, settings: Settings) -> Cost:
     demo = demo_files()
     warm_up = out.with_name("warm-up")
-    reconstruct_area(
-        Request(
-            (str(demo["cloud"]),), warm_up, str(demo["footprints"]), settings=settings, restart=True
-        )
-    )
+    ask = partial(Request, settings=settings, restart=True)
+    reconstruct_area(ask((str(demo["cloud"]),), warm_up, str(demo["footprints"])))
     cpu_start, started = measure_cpu(), time.perf_counter()
-    summary = reconstruct_area(
-        Request(tuple(clouds), out, footprints, settings=settings, processes=jobs, restart=True)
-    )
+    summary = reconstruct_area(ask(tuple(clouds), out, footprints, processes=jobs))
     wall, cpu = time.perf_counter() - started, measure_cpu() - cpu_start
     return Cost(summary.buildings, cpu, wall, max(usage.ru_maxrss for usage in get_usages()) / 1024)
 

@@ -19,7 +19,8 @@ those under the shape.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
@@ -64,8 +65,7 @@ class CurvedScene:
         """Return the true heights (n,) at places (n, 2) of the outline."""
         z = np.full(len(xy), SHAPE_EAVE_M)
         if self.has_house:
-            from_ridge = np.abs(xy[:, 1] - HOUSE_WIDTH_M / 2)
-            z = HOUSE_EAVE_M + HOUSE_SLOPE * (HOUSE_WIDTH_M / 2 - from_ridge)
+            z = measure_gable(xy)
             z[~shapely.contains_xy(make_house(), *xy.T)] = -np.inf
         inside = shapely.contains_xy(self.plan, *xy.T)
         shape = CATALOGUE[self.kind]
@@ -77,6 +77,33 @@ class CurvedScene:
 
 def make_house() -> shapely.Polygon:
     return shapely.box(0.0, 0.0, HOUSE_LENGTH_M, HOUSE_WIDTH_M)
+
+
+def measure_gable(xy: np.ndarray) -> np.ndarray:
+    """Return the heights (n,) of the gable of the house at places (n, 2)."""
+    return HOUSE_EAVE_M + HOUSE_SLOPE * (HOUSE_WIDTH_M / 2 - np.abs(xy[:, 1] - HOUSE_WIDTH_M / 2))
+
+
+def scan_roof(
+    rng: np.random.Generator,
+    outline: shapely.Polygon,
+    density: float,
+    height_at: Callable[[np.ndarray], np.ndarray],
+) -> np.ndarray:
+    """Scan points (n, 3) of a roof over `outline`, with noise."""
+    x0, y0, x1, y1 = outline.bounds
+    xy = rng.uniform((x0, y0), (x1, y1), (rng.poisson(density * (x1 - x0) * (y1 - y0)), 2))
+    xy = xy[shapely.contains_xy(outline, *xy.T)]
+    z = height_at(xy) + rng.normal(0.0, NOISE_M, len(xy))
+    return np.column_stack([xy + rng.normal(0.0, PLAN_NOISE_M, xy.shape), z])
+
+
+def make_grid(area: shapely.Polygon, part: shapely.Polygon) -> np.ndarray:
+    """Return the places (n, 2) in a part of an area at which heights are compared."""
+    x0, y0, x1, y1 = area.bounds
+    grid = np.stack(np.meshgrid(np.arange(x0, x1, GRID_M), np.arange(y0, y1, GRID_M)), axis=-1)
+    xy = grid.reshape(-1, 2)
+    return xy[shapely.contains_xy(part, *xy.T)]
 
 
 def draw_scene(kind: str, setting: str, seed: int, density: float) -> CurvedScene:
@@ -98,13 +125,8 @@ def draw_scene(kind: str, setting: str, seed: int, density: float) -> CurvedScen
         outline = shapely.union(shapely.Polygon(ring), plan)
     elif has_house:
         outline = shapely.union(make_house(), plan)
-    x0, y0, x1, y1 = outline.bounds
-    xy = rng.uniform((x0, y0), (x1, y1), (rng.poisson(density * (x1 - x0) * (y1 - y0)), 2))
-    xy = xy[shapely.contains_xy(outline, *xy.T)]
     scene = CurvedScene(kind, np.zeros((0, 3)), outline, plan, theta, has_house)
-    z = scene.height_at(xy) + rng.normal(0.0, NOISE_M, len(xy))
-    points = np.column_stack([xy + rng.normal(0.0, PLAN_NOISE_M, xy.shape), z])
-    return CurvedScene(kind, points, outline, plan, theta, has_house)
+    return replace(scene, points=scan_roof(rng, outline, density, scene.height_at))
 
 
 @dataclass(frozen=True)
@@ -119,10 +141,7 @@ class CurvedOutcome:
 def judge_scene(scene: CurvedScene) -> CurvedOutcome:
     """Fit the building of a scene, and compare it with the truth."""
     parts = fit_building(scene.points, scene.outline).roof_parts
-    x0, y0, x1, y1 = scene.plan.bounds
-    grid = np.stack(np.meshgrid(np.arange(x0, x1, GRID_M), np.arange(y0, y1, GRID_M)), axis=-1)
-    xy = grid.reshape(-1, 2)
-    xy = xy[shapely.contains_xy(scene.plan.intersection(scene.outline), *xy.T)]
+    xy = make_grid(scene.plan, scene.plan.intersection(scene.outline))
     true, found = scene.height_at(xy), find_highest(parts, xy)[0]
     return CurvedOutcome(
         any(part.type == scene.kind for part in parts),
@@ -137,13 +156,11 @@ def is_slim_tower_found(seed: int, density: float) -> bool:
     house, ridge = make_house(), HOUSE_EAVE_M + HOUSE_SLOPE * HOUSE_WIDTH_M / 2
     x, y = rng.uniform((0.0, 0.0), (HOUSE_LENGTH_M - TOWER_M, HOUSE_WIDTH_M - TOWER_M))
     tower, top = shapely.box(x, y, x + TOWER_M, y + TOWER_M), ridge + rng.uniform(3.0, 15.0)
-    count = rng.poisson(density * house.area)
-    xy = rng.uniform((0.0, 0.0), (HOUSE_LENGTH_M, HOUSE_WIDTH_M), (count, 2))
-    z = ridge - HOUSE_SLOPE * np.abs(xy[:, 1] - HOUSE_WIDTH_M / 2)
-    z[shapely.contains_xy(tower, *xy.T)] = top
-    z += rng.normal(0.0, NOISE_M, count)
-    points = np.column_stack([xy + rng.normal(0.0, PLAN_NOISE_M, xy.shape), z])
-    parts = fit_building(points, house).roof_parts
+
+    def height_at(xy: np.ndarray) -> np.ndarray:
+        return np.where(shapely.contains_xy(tower, *xy.T), top, measure_gable(xy))
+
+    parts = fit_building(scan_roof(rng, house, density, height_at), house).roof_parts
     middle = shapely.get_coordinates(tower.centroid)
     return bool(abs(find_highest(parts, middle)[0][0] - top) <= 0.3)
 
@@ -169,22 +186,11 @@ def is_drum_found(setting: str, seed: int, density: float) -> bool:
     outline = shapely.union(around, plan)
 
     def height_at(xy: np.ndarray) -> np.ndarray:
-        from_ridge = np.abs(xy[:, 1] - HOUSE_WIDTH_M / 2)
-        z = HOUSE_EAVE_M + HOUSE_SLOPE * (HOUSE_WIDTH_M / 2 - from_ridge)
-        z[:] = RING_M if setting == "ring" else z
-        z[shapely.contains_xy(plan, *xy.T)] = top
-        return z
+        z = RING_M if setting == "ring" else measure_gable(xy)
+        return np.where(shapely.contains_xy(plan, *xy.T), top, z)
 
-    x0, y0, x1, y1 = outline.bounds
-    xy = rng.uniform((x0, y0), (x1, y1), (rng.poisson(density * (x1 - x0) * (y1 - y0)), 2))
-    xy = xy[shapely.contains_xy(outline, *xy.T)]
-    z = height_at(xy) + rng.normal(0.0, NOISE_M, len(xy))
-    points = np.column_stack([xy + rng.normal(0.0, PLAN_NOISE_M, xy.shape), z])
-    parts = fit_building(points, outline).roof_parts
-    grid = np.stack(np.meshgrid(np.arange(x0, x1, GRID_M), np.arange(y0, y1, GRID_M)), axis=-1)
-    near = shapely.intersection(shapely.buffer(plan, 0.5), outline)
-    places = grid.reshape(-1, 2)
-    places = places[shapely.contains_xy(near, *places.reshape(-1, 2).T)]
+    parts = fit_building(scan_roof(rng, outline, density, height_at), outline).roof_parts
+    places = make_grid(outline, shapely.intersection(shapely.buffer(plan, 0.5), outline))
     right = np.abs(find_highest(parts, places)[0] - height_at(places)) <= 0.3
     return bool(right.mean() >= RIGHT_PLAN)
 
@@ -200,13 +206,11 @@ def main() -> None:
             for setting, kinds in KINDS.items():
                 for kind in kinds if not a.kinds else set(kinds) & set(a.kinds):
                     outcomes = [judge_scene(draw_scene(kind, setting, s, density)) for s in seeds]
-                    right = np.array(
-                        [
-                            (o.is_right, abs(o.height_error_m) <= 0.2, abs(o.volume_error) <= 0.03)
-                            for o in outcomes
-                        ]
-                    )
-                    table.add(density, setting, kind, *(100.0 * right.mean(axis=0)))
+                    right = [
+                        (o.is_right, abs(o.height_error_m) <= 0.2, abs(o.volume_error) <= 0.03)
+                        for o in outcomes
+                    ]
+                    table.add(density, setting, kind, *(100.0 * np.mean(right, axis=0)))
             found = [is_slim_tower_found(seed, density) for seed in seeds]
             table.add(density, "slim tower", "", 100.0 * np.mean(found), "", "")
             for setting in DRUM_SETTINGS:

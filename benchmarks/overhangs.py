@@ -110,9 +110,8 @@ def is_valid(building: Building) -> bool:
     triangles = np.concatenate([triangulate_face(solid, face) for face in solid.faces])
     mesh = trimesh.Trimesh(**trimesh.triangles.to_kwargs(triangles))
     is_closed = mesh.is_watertight and mesh.is_winding_consistent
-    return bool(is_closed and np.isclose(mesh.volume, solid.volume, rtol=1e-3)) and not check_solid(
-        solid
-    )
+    keeps_volume = is_closed and np.isclose(mesh.volume, solid.volume, rtol=1e-3)
+    return bool(keeps_volume) and not check_solid(solid)
 
 
 def triangulate_face(solid: Solid, face: Face) -> np.ndarray:

@@ -98,14 +98,9 @@ def group_touching(id: str, solids: dict[str, Solid]) -> list[TrueBuilding]:
     outlines = sorted((o for o in outlines if o.area > 0), key=lambda outline: -outline.area)
     groups = []
     for k, outline in enumerate(outlines):
-        members = {
-            name: solids[name]
-            for name, ground in grounds.items()
-            if find_nearest(ground, outlines) == k
-        }
-        groups.append(
-            TrueBuilding(id if k == 0 else f"{id}~{k + 1}", members, outline.simplify(TOUCH_M))
-        )
+        touching = [n for n, ground in grounds.items() if find_nearest(ground, outlines) == k]
+        members, name = {n: solids[n] for n in touching}, id if k == 0 else f"{id}~{k + 1}"
+        groups.append(TrueBuilding(name, members, outline.simplify(TOUCH_M)))
     return groups
 
 
@@ -132,10 +127,8 @@ def choose_buildings(
     buildings = buildings if parity is None else buildings[("even", "odd").index(parity) :: 2]
     if limit is None or limit >= len(buildings):
         return buildings
-    return [
-        buildings[k]
-        for k in sorted(np.random.default_rng(0).choice(len(buildings), limit, replace=False))
-    ]
+    chosen = np.random.default_rng(0).choice(len(buildings), limit, replace=False)
+    return [buildings[k] for k in sorted(chosen)]
 
 
 def write_truth(path: Path, source: Path, buildings: list[TrueBuilding]) -> None:

@@ -13,6 +13,7 @@ from __future__ import annotations
 import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +29,7 @@ from hiproof.simulate import (
     scan,
     scan_solids,
 )
+from hiproof.simulate.scanner import Scan
 from hiproof.simulate.scene import Defects
 
 from .towns import TOWNS, TrueBuilding, read_town
@@ -72,6 +74,7 @@ class Scene:
 
 
 Defect = Callable[[Scene, np.random.Generator], Scene]
+Scanner = Callable[[np.random.Generator, ScanSettings], Scan]
 
 
 def draw_direction(rng: np.random.Generator) -> np.ndarray:
@@ -107,23 +110,17 @@ def draw_facade_points(scene: Scene, rng: np.random.Generator, count: int) -> np
     weight = np.maximum(outwards @ seen_from, 0.0)
     side = rng.choice(len(edges), count, p=weight / weight.sum())
     xy = corners[side] + rng.random((count, 1)) * edges[side]
-    xy -= (
-        outwards[side]
-        / np.hypot(*outwards[side].T)[:, None]
-        * np.abs(rng.normal(0.0, 0.06, (count, 1)))
-    )
-    top = np.quantile(scene.points[:, 2], 0.1)
-    return np.column_stack(
-        [xy, rng.uniform(scene.z_ground + 0.5, max(top, scene.z_ground + 1.0), count)]
-    )
+    inwards = -outwards[side] / np.hypot(*outwards[side].T)[:, None]
+    xy += inwards * np.abs(rng.normal(0.0, 0.06, (count, 1)))
+    top = max(np.quantile(scene.points[:, 2], 0.1), scene.z_ground + 1.0)
+    return np.column_stack([xy, rng.uniform(scene.z_ground + 0.5, top, count)])
 
 
 def add_facades(scene: Scene, rng: np.random.Generator) -> Scene:
     """Add a fifth to twice as many points on walls as on the roof."""
     count = int(len(scene.points) * rng.uniform(0.2, 2.0)) + 1
-    return replace(
-        scene, points=np.concatenate([scene.points, draw_facade_points(scene, rng, count)])
-    )
+    facades = draw_facade_points(scene, rng, count)
+    return replace(scene, points=np.concatenate([scene.points, facades]))
 
 
 def keep_walls(scene: Scene, rng: np.random.Generator) -> Scene:
@@ -141,9 +138,8 @@ def widen_footprint(scene: Scene, rng: np.random.Generator) -> Scene:
     """Widen the footprint by a yard beside its building."""
     west, south, east, north = scene.footprint.bounds
     shift = draw_direction(rng) * rng.uniform(0.1, 0.5) * np.array([east - west, north - south])
-    wider = shapely.union_all(
-        [scene.footprint, shapely.transform(scene.footprint, lambda xy: xy + shift)]
-    )
+    moved = shapely.transform(scene.footprint, lambda xy: xy + shift)
+    wider = shapely.union(scene.footprint, moved)
     return replace(scene, footprint=max(shapely.get_parts(wider), key=shapely.area))
 
 
@@ -184,37 +180,17 @@ def make_generator(*words: object) -> np.random.Generator:
     return np.random.default_rng(zlib.crc32(" ".join(map(str, words)).encode()))
 
 
-def simulate_compound(
-    seed: int,
-) -> tuple[TrueBuilding, Callable[[np.random.Generator, ScanSettings], np.ndarray]]:
+def simulate_compound(seed: int) -> tuple[TrueBuilding, Scanner]:
     """Simulate a compound as a true building, and what scans it."""
     rng = np.random.default_rng([seed, 7])
     building = random_compound(rng, COMPOUND_KINDS[seed // 2 % len(COMPOUND_KINDS)])
-    solid = compose(building.roof, 0.0)
-
-    def scan_house(rng: np.random.Generator, settings: ScanSettings) -> np.ndarray:
-        cloud = scan(building, rng, settings)
-        return cloud.points[cloud.source != SOURCES.index("ground")]
-
-    origin = building.roof.frame.origin
-    return TrueBuilding(
-        f"compound-{seed}", {"a": solid.move(origin)}, building.footprint
-    ), scan_house
+    solid = compose(building.roof, 0.0).move(building.roof.frame.origin)
+    return TrueBuilding(f"compound-{seed}", {"a": solid}, building.footprint), partial(
+        scan, building
+    )
 
 
-def take_from_town(
-    building: TrueBuilding,
-) -> Callable[[np.random.Generator, ScanSettings], np.ndarray]:
-    """Return what scans a building of a town."""
-
-    def scan_house(rng: np.random.Generator, settings: ScanSettings) -> np.ndarray:
-        cloud = scan_solids(list(building.solids.values()), rng, settings)
-        return cloud.points[cloud.source != SOURCES.index("ground")]
-
-    return scan_house
-
-
-def iterate_buildings(source: str, limit: int) -> Iterator[tuple[int, TrueBuilding, Callable]]:
+def iterate_buildings(source: str, limit: int) -> Iterator[tuple[int, TrueBuilding, Scanner]]:
     """Yield number, truth and scanner of at most so many buildings."""
     if source == "compounds":
         yield from ((seed, *simulate_compound(seed)) for seed in range(limit))
@@ -222,19 +198,15 @@ def iterate_buildings(source: str, limit: int) -> Iterator[tuple[int, TrueBuildi
     town = read_town(Path(PLACES[source]))
     step = max(1, len(town) // limit)
     for number, building in enumerate(town[::step][:limit]):
-        yield number, building, take_from_town(building)
+        yield number, building, partial(scan_solids, list(building.solids.values()))
 
 
 def find_seen_area(scene: Scene, density: float) -> shapely.Geometry:
     """Return the true area as far as it has points, with gaps closed."""
     spacing, points = density**-0.5, scene.points[:: max(1, len(scene.points) // MOST_SEEN)]
     spacing = max(spacing, (scene.asked.area / max(len(points), 1)) ** 0.5)
-    seen_area = (
-        shapely.multipoints(points[:, :2])
-        .buffer(1.5 * spacing, quad_segs=3)
-        .buffer(-spacing, quad_segs=3)
-    )
-    area = shapely.intersection(scene.asked, seen_area)
+    wide = shapely.multipoints(points[:, :2]).buffer(1.5 * spacing, quad_segs=3)
+    area = shapely.intersection(scene.asked, wide.buffer(-spacing, quad_segs=3))
     return scene.asked if area.is_empty else area
 
 
@@ -249,10 +221,10 @@ def iterate_cases(
         rng = make_generator(building.id, density, with_footprints)
         kind = number // 2 % 4
         defect = SOUND[kind] if kind < 2 else other_defects[int(rng.integers(len(other_defects)))]
-        defects = (
-            Defects.none() if defect == "none" else CLUTTERED if source == "compounds" else SCANNER
-        )
-        points = scanned(rng, ScanSettings(density=density, defects=defects))
+        faults = CLUTTERED if source == "compounds" else SCANNER
+        defects = Defects.none() if defect == "none" else faults
+        cloud = scanned(rng, ScanSettings(density=density, defects=defects))
+        points = cloud.points[cloud.source != SOURCES.index("ground")]
         z_ground = min(float(solid.vertices[:, 2].min()) for solid in building.solids.values())
         scene = Scene(points, building.footprint, building.footprint, z_ground)
         if len(points) >= 10 and defect in DEFECTS:
