@@ -5,7 +5,6 @@ import os
 import signal
 import warnings
 
-import numpy as np
 import pytest
 
 import pages
@@ -18,7 +17,7 @@ from hiproof.city.work.tasks import WITHOUT_FOOTPRINTS, make_ready
 from hiproof.compiled import news
 from hiproof.garbage import RARELY
 from hiproof.parametric.run import build_file
-from sample_models import sample_points, write_sample_run
+from sample_models import write_scanned_run
 from sample_parameters import write_parameters_of_each_kind
 from tiny_town import write_town
 
@@ -65,6 +64,12 @@ def restore_secrets(monkeypatch):
     monkeypatch.setattr(masking, "SECRETS", masking.Secrets())
 
 
+@pytest.fixture
+def quick_tiles(monkeypatch):
+    """Buildings of a run are counted points, not fitted."""
+    monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
+
+
 @pytest.fixture(scope="session")
 def town_files(tmp_path_factory):
     """Paths of the tiny town's cloud and footprints."""
@@ -99,10 +104,7 @@ def solved_ids(monkeypatch):
 @pytest.fixture(scope="session")
 def sample_run(tmp_path_factory):
     """The folder of a small finished run and its points; do not write into it."""
-    folder = tmp_path_factory.mktemp("sample")
-    write_sample_run(folder)
-    np.savetxt(folder / "points.xyz", sample_points(), fmt="%.3f")
-    return folder
+    return write_scanned_run(tmp_path_factory.mktemp("sample"))
 
 
 @pytest.fixture(scope="session")

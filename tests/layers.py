@@ -1,5 +1,8 @@
 """Vector layers and rasters of tests, each written in a line."""
 
+import sqlite3
+from contextlib import contextmanager
+
 import numpy as np
 import pyogrio
 import shapely
@@ -25,3 +28,14 @@ def write_raster(path, heights, west, north, step=1.0, crs="EPSG:28992", **optio
     with rasterio.open(path, "w", driver="GTiff", crs=crs, transform=corner, **options) as file:
         file.write(heights, 1)
     return str(path)
+
+
+@contextmanager
+def opened_geopackage(path):
+    """The database of a layer that was written with SPATIAL_INDEX="NO", which takes any values."""
+    with sqlite3.connect(path) as base:
+        for (trigger,) in base.execute(
+            "select name from sqlite_master where type = 'trigger'"
+        ).fetchall():
+            base.execute(f'drop trigger "{trigger}"')
+        yield base

@@ -126,3 +126,10 @@ def sample_points(seed=0, noise=0.02, density=4.0):
     points = np.concatenate([gable, block])
     points[:, 2] += rng.normal(0, noise, len(points))
     return points + ORIGIN
+
+
+def write_scanned_run(folder):
+    """Write the sample and its points; return the folder."""
+    write_sample_run(folder)
+    np.savetxt(folder / "points.xyz", sample_points(), fmt="%.3f")
+    return folder

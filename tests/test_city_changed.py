@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 import shapely
 
-import planted
 from hiproof.city import run as city_run
 from hiproof.city.folder import resume
 from hiproof.city.folder.ledger import Ledger
@@ -24,9 +23,8 @@ from tiny_town import make_town, write_footprints, write_town
 
 
 @pytest.fixture
-def town(tmp_path, solved_ids, monkeypatch):
+def town(tmp_path, solved_ids, quick_tiles):
     """The houses, their cloud, and a way to write and run another set of them."""
-    monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     houses = make_town().footprints
     cloud, path = write_town(tmp_path / "town")
     request = Request((str(cloud),), tmp_path / "out", str(path))

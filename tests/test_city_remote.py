@@ -5,8 +5,6 @@ as from files.
 import numpy as np
 import pytest
 
-import planted
-from hiproof.city import run as city_run
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.errors import InputError
 from hiproof.read.points.pointcloud import read_points
@@ -37,9 +35,8 @@ def write_terrain(path, town):
 
 
 def test_clouds_footprints_and_terrain_by_address_give_the_same_bytes(
-    server, tmp_path, monkeypatch
+    server, tmp_path, quick_tiles
 ):
-    monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     folder, address, log = server
     town = make_town()
     cloud, footprints = write_town(folder, town)

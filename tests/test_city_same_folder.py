@@ -19,9 +19,7 @@ import shapely
 from click.testing import CliRunner
 
 import hiproof
-import planted
 from handmade import courtyard, gable_house, make_building, make_lost_building
-from hiproof.city import run as city_run
 from hiproof.city.folder.marks import (
     compute_mark,
     describe_inputs,
@@ -47,11 +45,6 @@ from run_records import records
 REQUEST = Request(("a.laz",), Path("out"))
 NO_MATTER = {"out", "overrides", "processes", "scheduler", "restart", "use_attribute"}
 WHICH = {"footprints", "layer", "id_attribute", "where", "bbox", "underpasses"}
-
-
-@pytest.fixture
-def quick(monkeypatch):
-    monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
 
 
 def other(value):
@@ -178,7 +171,7 @@ def test_a_folder_is_stamped_by_its_files_and_no_text_by_accident(tmp_path):
 
 
 def test_another_setting_is_refused_by_name_and_the_same_request_is_not(
-    town_files, tmp_path, quick
+    town_files, tmp_path, quick_tiles
 ):
     request = Request((town_files[0],), tmp_path, town_files[1])
     reconstruct_area(request)
@@ -188,7 +181,7 @@ def test_another_setting_is_refused_by_name_and_the_same_request_is_not(
         reconstruct_area(dataclasses.replace(request, settings=settings))
 
 
-def test_a_replaced_tile_is_named(town_files, tmp_path, quick):
+def test_a_replaced_tile_is_named(town_files, tmp_path, quick_tiles):
     tiles = tmp_path / "tiles"
     tiles.mkdir()
     for name in ("a.laz", "b.laz"):
@@ -200,7 +193,9 @@ def test_a_replaced_tile_is_named(town_files, tmp_path, quick):
         reconstruct_area(request)
 
 
-def test_a_second_run_in_the_folder_is_refused_while_status_reads(town_files, tmp_path, quick):
+def test_a_second_run_in_the_folder_is_refused_while_status_reads(
+    town_files, tmp_path, quick_tiles
+):
     request, errors = Request((town_files[0],), tmp_path, town_files[1]), []
 
     def second(step, finished, total):
@@ -240,7 +235,7 @@ def test_a_folder_that_cannot_be_locked_says_so(tmp_path):
 @pytest.mark.parametrize("harm", ["removed", "cut", "one byte"])
 @pytest.mark.parametrize("name", ["buildings.gml", "parameters.jsonl", "buildings.gpkg"])
 def test_a_file_that_was_lost_or_damaged_is_made_again(
-    harm, name, town_files, reference_run, tmp_path, quick
+    harm, name, town_files, reference_run, tmp_path, quick_tiles
 ):
     request = Request((town_files[0],), tmp_path, town_files[1])
     reconstruct_area(request)
@@ -265,7 +260,7 @@ def test_a_file_that_was_lost_or_damaged_is_made_again(
     [{}, {"city": {"models": "tiles"}}, {"city": {"models": "both"}, "write": {"citygml": "3.0"}}],
     ids=["merged", "tiles", "both, CityGML 3.0"],
 )
-def test_models_stand_where_the_summary_says(town_files, tmp_path, quick, settings):
+def test_models_stand_where_the_summary_says(town_files, tmp_path, quick_tiles, settings):
     request = Request(
         (town_files[0],), tmp_path, town_files[1], settings=Settings.from_dict(settings)
     )
@@ -278,7 +273,7 @@ def test_models_stand_where_the_summary_says(town_files, tmp_path, quick, settin
             run_models(tmp_path)
 
 
-def test_models_of_work_tiles_are_claimed_too(town_files, tmp_path, quick):
+def test_models_of_work_tiles_are_claimed_too(town_files, tmp_path, quick_tiles):
     settings = Settings.from_dict({"city": {"models": "tiles"}})
     request = Request((town_files[0],), tmp_path, town_files[1], settings=settings)
     reconstruct_area(request)
@@ -290,7 +285,7 @@ def test_models_of_work_tiles_are_claimed_too(town_files, tmp_path, quick):
     assert lost.read_bytes() == content
 
 
-def test_a_table_that_was_only_looked_at_stands(town_files, tmp_path, quick):
+def test_a_table_that_was_only_looked_at_stands(town_files, tmp_path, quick_tiles):
     request = Request((town_files[0],), tmp_path, town_files[1])
     reconstruct_area(request)
     table = tmp_path / "buildings.gpkg"
@@ -317,7 +312,7 @@ class Bomb:
         return (open, (str(self.mark), "w"))
 
 
-def test_what_a_run_finds_in_its_folder_is_never_executed(town_files, tmp_path, quick):
+def test_what_a_run_finds_in_its_folder_is_never_executed(town_files, tmp_path, quick_tiles):
     request, exploded = (
         Request((town_files[0],), tmp_path / "out", town_files[1]),
         tmp_path / "exploded",

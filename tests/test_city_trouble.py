@@ -74,9 +74,8 @@ def stop_in_second_tile(request):
 
 
 def test_losses_with_the_main_process_lead_to_quarantine(
-    town_files, reference_run, tmp_path, monkeypatch
+    town_files, reference_run, tmp_path, monkeypatch, quick_tiles
 ):
-    monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     request = Request((town_files[0],), tmp_path, town_files[1])
 
     stop_in_second_tile(request)
@@ -94,9 +93,8 @@ def test_losses_with_the_main_process_lead_to_quarantine(
 
 
 def test_points_that_somebody_removed_are_sorted_again(
-    town_files, reference_run, tmp_path, monkeypatch
+    town_files, reference_run, tmp_path, quick_tiles
 ):
-    monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     request = Request((town_files[0],), tmp_path, town_files[1])
 
     stop_in_second_tile(request)
@@ -105,8 +103,7 @@ def test_points_that_somebody_removed_are_sorted_again(
     assert records(tmp_path) == records(reference_run)
 
 
-def test_a_damaged_list_of_what_to_redo_harms_no_run(town_files, tmp_path, monkeypatch):
-    monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
+def test_a_damaged_list_of_what_to_redo_harms_no_run(town_files, tmp_path, quick_tiles):
     request = Request((town_files[0],), tmp_path, town_files[1], processes=None)
     reconstruct_area(request)
     (tmp_path / ".hiproof" / "redo.json").write_text("{")
@@ -114,9 +111,8 @@ def test_a_damaged_list_of_what_to_redo_harms_no_run(town_files, tmp_path, monke
 
 
 def test_a_full_disk_ends_in_one_sentence_and_the_run_goes_on_later(
-    town_files, reference_run, tmp_path, monkeypatch
+    town_files, reference_run, tmp_path, monkeypatch, quick_tiles
 ):
-    monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     request = Request((town_files[0],), tmp_path, town_files[1])
     original, written = output_files.OutputFile.write, []
 
@@ -137,9 +133,8 @@ def test_a_full_disk_ends_in_one_sentence_and_the_run_goes_on_later(
 
 
 def test_unfinished_files_of_a_killed_worker_are_not_read(
-    town_files, reference_run, tmp_path, monkeypatch
+    town_files, reference_run, tmp_path, quick_tiles
 ):
-    monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
 
     def litter(step, finished, total):
         if step == "solve" and finished == 0:
@@ -163,9 +158,8 @@ def make_older_ledger(path):
 
 @pytest.mark.parametrize("make", [spoil_ledger, make_older_ledger])
 def test_a_ledger_that_is_none_of_this_version_is_refused_and_replaced_on_restart(
-    town_files, tmp_path, monkeypatch, make
+    town_files, tmp_path, quick_tiles, make
 ):
-    monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     (tmp_path / ".hiproof").mkdir()
     make(tmp_path / ".hiproof" / "ledger.sqlite")
     with pytest.raises(OutputError, match="--restart"):
@@ -188,9 +182,8 @@ def test_a_full_disk_is_no_fault_of_the_ledger(town_files, tmp_path, monkeypatch
 
 
 def test_files_without_points_are_said_and_harm_none(
-    town_files, reference_run, tmp_path, monkeypatch
+    town_files, reference_run, tmp_path, quick_tiles
 ):
-    monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     empty = str(write_cloud(tmp_path / "empty.laz", np.zeros((0, 3)), np.zeros(0, np.uint8)))
     with pytest.raises(InputError, match=r"expected points in .*empty\.laz, got none"):
         reconstruct_area(Request((empty,), tmp_path / "none", town_files[1]))
@@ -199,8 +192,9 @@ def test_files_without_points_are_said_and_harm_none(
     assert by_id(tmp_path / "out") == by_id(reference_run)
 
 
-def test_overlapping_tiles_and_small_buffers_change_no_byte(reference_run, tmp_path, monkeypatch):
-    monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
+def test_overlapping_tiles_and_small_buffers_change_no_byte(
+    reference_run, tmp_path, monkeypatch, quick_tiles
+):
     chunks, flush = [], Gatherer.flush
     monkeypatch.setattr(Gatherer, "flush", lambda self: (chunks.append(self.number), flush(self)))
     monkeypatch.setattr("hiproof.city.work.sort.HELD_POINTS", 1000)
@@ -213,13 +207,8 @@ def test_overlapping_tiles_and_small_buffers_change_no_byte(reference_run, tmp_p
         ("a", town.xyz[:, 0] > middle - 15),
     ):
         members = rng.permutation(np.flatnonzero(is_in_tile))
-        clouds.append(
-            str(
-                write_cloud(
-                    tmp_path / f"{name}.laz", town.xyz[members], town.classification[members]
-                )
-            )
-        )
+        xyz, classes = town.xyz[members], town.classification[members]
+        clouds.append(str(write_cloud(tmp_path / f"{name}.laz", xyz, classes)))
     footprints = write_footprints(tmp_path / "footprints.geojson", town.footprints)
     reconstruct_area(Request(tuple(clouds), tmp_path / "out", str(footprints)))
     assert min(chunks.count(number) for number in (0, 1)) > 1
@@ -288,9 +277,8 @@ def test_the_ledger_tells_losses_from_orderly_ends(tmp_path):
 
 
 def test_an_indexed_file_is_asked_box_by_box_for_the_same_points(
-    reference_run, tmp_path, monkeypatch
+    reference_run, tmp_path, monkeypatch, quick_tiles
 ):
-    monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     monkeypatch.setattr("hiproof.city.work.sort.QUERY_M", 25.0)
     town = make_town()
     cloud = write_copc(tmp_path / "cloud.copc.laz", town.xyz, town.classification)
@@ -300,9 +288,8 @@ def test_an_indexed_file_is_asked_box_by_box_for_the_same_points(
 
 
 def test_an_index_beside_the_file_saves_points_and_changes_no_byte(
-    reference_run, tmp_path, monkeypatch
+    reference_run, tmp_path, monkeypatch, quick_tiles
 ):
-    monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     monkeypatch.setattr("hiproof.read.points.runs.RUN_POINTS", 50)
     town = make_town()
     along = np.argsort(town.xyz[:, 0].round(-1), kind="stable")
@@ -322,9 +309,8 @@ def test_an_index_beside_the_file_saves_points_and_changes_no_byte(
 
 
 def test_models_by_work_tile_are_the_merged_ones_cut(
-    town_files, reference_run, tmp_path, monkeypatch
+    town_files, reference_run, tmp_path, quick_tiles
 ):
-    monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     by_tile, out = Settings.from_dict({"city": {"models": "tiles"}}), tmp_path / "out"
     reconstruct_area(Request((town_files[0],), out, town_files[1], settings=by_tile))
     files = sorted(path.name for path in (out / "models").iterdir())
@@ -345,9 +331,8 @@ def test_models_by_work_tile_are_the_merged_ones_cut(
 
 
 def test_a_new_run_removes_the_models_of_old_work_tiles_and_nothing_else(
-    town_files, tmp_path, monkeypatch
+    town_files, tmp_path, quick_tiles
 ):
-    monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     settings = Settings.from_dict({"city": {"models": "both"}})
     reconstruct_area(Request((town_files[0],), tmp_path, town_files[1], settings=settings))
     assert (tmp_path / "buildings.gml").exists() and len(list((tmp_path / "models").iterdir())) == 4

@@ -8,7 +8,6 @@ import warnings
 import pytest
 
 import planted
-from hiproof.city import run as city_run
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.errors import HiproofError, InputError, InputWarning
 from hiproof.masking import mask, masked_values
@@ -85,8 +84,7 @@ def test_every_error_masks_its_own_text(kind):
     assert "s3cret" not in str(kind("expected points at https://u:s3cret@host/a.laz, got none"))
 
 
-def test_a_run_leaves_no_secret_in_any_of_its_files(town_files, tmp_path, monkeypatch):
-    monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
+def test_a_run_leaves_no_secret_in_any_of_its_files(town_files, tmp_path, monkeypatch, quick_tiles):
     monkeypatch.setattr(
         "hiproof.city.plan.prepare.jobs_from_footprints", planted.read_jobs_from(town_files[1])
     )

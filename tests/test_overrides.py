@@ -454,6 +454,12 @@ def test_a_table_says_yes_in_many_ways_and_what_is_none_is_refused(tmp_path, tex
         read_override(*table_records(str(tmp_path / "o.csv")))
 
 
+def run_with_overrides(town_files, folder, name):
+    cloud, footprints = town_files
+    options = {"settings": PLAIN, "overrides": str(folder / name)}
+    city_run.reconstruct_area(hiproof.Request((cloud,), folder / "out", footprints, **options))
+
+
 def test_tables_override_too(town_files, tmp_path):
     (tmp_path / "o.csv").write_text(
         "id,type,ridge_height,leave_out\nhouse-0,hip,,\nhouse-1,,,true\nelsewhere,,9.5,\n"
@@ -461,15 +467,7 @@ def test_tables_override_too(town_files, tmp_path):
     with pytest.warns(
         InputWarning, match="no building of this run for 1 of 3 overrides: elsewhere"
     ):
-        city_run.reconstruct_area(
-            hiproof.Request(
-                (town_files[0],),
-                tmp_path / "out",
-                town_files[1],
-                settings=PLAIN,
-                overrides=str(tmp_path / "o.csv"),
-            )
-        )
+        run_with_overrides(town_files, tmp_path, "o.csv")
     rows = by_id(tmp_path / "out")
     assert rows["house-0"]["type"] == "hip" and rows["house-1"]["status"] == "left_out"
 
@@ -487,12 +485,5 @@ def test_overrides_that_cannot_be_read_are_refused_before_anything_is_redone(
 ):
     (tmp_path / "o.jsonl").write_text(text)
     with pytest.raises(InputError, match=message):
-        city_run.reconstruct_area(
-            hiproof.Request(
-                (town_files[0],),
-                tmp_path / "out",
-                town_files[1],
-                overrides=str(tmp_path / "o.jsonl"),
-            )
-        )
+        run_with_overrides(town_files, tmp_path, "o.jsonl")
     assert not list((tmp_path / "out").glob("*.gml"))

@@ -11,7 +11,6 @@ import pytest
 import shapely
 from pyproj import Transformer
 
-import planted
 from hiproof.city import run as city_run
 from hiproof.city.plan.prepare import make_plan
 from hiproof.city.run import Request, reconstruct_area
@@ -78,11 +77,10 @@ def first_byte(metadata, group):
 
 
 @pytest.fixture
-def served_release(tmp_path, monkeypatch):
+def served_release(tmp_path, monkeypatch, quick_tiles):
     """A folder with the cloud of the town, settings that name the release's catalogue, and the file
     that lists the ranges asked for.
     """
-    monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     monkeypatch.setattr(
         city_run, "list_compiled_pieces", lambda request: ()
     )  # solved without compiled code

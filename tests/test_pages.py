@@ -22,7 +22,7 @@ from pages import (
     project_on_canvas,
 )
 from parametric_house import gable_house
-from sample_models import sample_points, write_sample_run
+from sample_models import write_scanned_run
 
 pytestmark = [needs_browser, pytest.mark.filterwarnings("ignore::hiproof.errors.InputWarning")]
 FILLED = 0.4  # of the canvas, the least that a scene fills one way: it is whole, but not lost
@@ -32,10 +32,7 @@ READY = "async () => { do await new Promise(done => setTimeout(done, 50)); while
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("run")
-    write_sample_run(folder)
-    np.savetxt(folder / "points.xyz", sample_points(), fmt="%.3f")
-    return folder
+    return write_scanned_run(tmp_path_factory.mktemp("run"))
 
 
 @pytest.fixture(scope="module")

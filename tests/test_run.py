@@ -104,8 +104,7 @@ def test_what_a_run_begun_anew_does_not_write_is_not_left_from_before(files, tmp
         evaluate_run(tmp_path)
 
 
-def test_the_demo_replaces_itself_and_nobody_elses_run(files, tmp_path, monkeypatch):
-    monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
+def test_the_demo_replaces_itself_and_nobody_elses_run(files, tmp_path, quick_tiles):
     reconstruct_area(Request((str(files[0]),), tmp_path / "own", str(files[1])))
     old_records = records(tmp_path / "own")
     refused = CliRunner().invoke(app, ["demo", "--out", str(tmp_path / "own")])
@@ -181,22 +180,16 @@ def test_how_the_area_is_cut_changes_no_byte(finished_run, tmp_path):
                 (part == number) | ((part == (number + 1) % 9) & (rng.random(len(part)) < 0.2))
             )
         )
-        clouds.append(
-            str(
-                write_cloud(
-                    tmp_path / f"{name}.laz", town.xyz[members], town.classification[members]
-                )
-            )
-        )
+        xyz, classes = town.xyz[members], town.classification[members]
+        clouds.append(str(write_cloud(tmp_path / f"{name}.laz", xyz, classes)))
     footprints = write_footprints(tmp_path / "footprints.geojson", town.footprints)
     reconstruct_area(Request(tuple(sorted(clouds)), tmp_path / "out", str(footprints)))
     assert records(tmp_path / "out") == records(finished_run[0])
 
 
 @pytest.mark.parametrize("processes", [1, 2])
-def test_progress_is_by_building(town_files, tmp_path, monkeypatch, processes):
+def test_progress_is_by_building(town_files, tmp_path, quick_tiles, processes):
     """In this process every building is told of; workers are asked from time to time."""
-    monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     steps = []
     request = Request((town_files[0],), tmp_path, town_files[1], processes=processes)
     reconstruct_area(request, lambda *progress: steps.append(progress))

@@ -14,9 +14,7 @@ import shapely
 from lxml import etree
 from rasterio.transform import from_origin
 
-import planted
 from hiproof import read_parameters
-from hiproof.city import run as city_run
 from hiproof.city.folder.ledger import Ledger
 from hiproof.city.plan.prepare import make_plan
 from hiproof.city.run import Request, reconstruct_area
@@ -241,9 +239,8 @@ def test_a_terrain_model_in_feet_answers_in_metres(tmp_path, crs, size, height, 
     assert heights[0] == pytest.approx(expected) and np.isnan(heights[1])
 
 
-def test_an_index_in_feet_is_asked_in_feet(tmp_path, monkeypatch):
+def test_an_index_in_feet_is_asked_in_feet(tmp_path, monkeypatch, quick_tiles):
     """COPC and `.lax` save points, but none that a building needs."""
-    monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     monkeypatch.setattr("hiproof.city.work.sort.QUERY_M", 25.0)
     monkeypatch.setattr("hiproof.read.points.runs.RUN_POINTS", 50)
     along = np.argsort(TOWN.xyz[:, 0].round(-1), kind="stable")

@@ -4,6 +4,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+import pytest
 from lxml import etree
 
 from hiproof.compose import check_solid
@@ -20,11 +21,17 @@ OF_CITYGML = {"buildings.gml": "citygml2", "buildings.citygml3.gml": "citygml3"}
 
 
 @cache
-def open_schema(name):
+def open_schema(name, file="CityGML.xsd"):
     """The schema of a version of CityGML, None where ../shared has none."""
-    path = SCHEMAS / name / "CityGML.xsd"
+    path = SCHEMAS / name / file
     parser = etree.XMLParser(no_network=True, huge_tree=True)
     return etree.XMLSchema(etree.parse(path, parser)) if path.exists() else None
+
+
+def require_schema(*name):
+    """The schema that `open_schema` gives; without one the test is skipped."""
+    schema = open_schema(*name)
+    return pytest.skip(f"needs {name[0]} in ../shared/schemas") if schema is None else schema
 
 
 def write_run(folder, buildings, write, crs="EPSG:7415"):

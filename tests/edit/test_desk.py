@@ -147,15 +147,13 @@ def test_whatever_speaks_against_a_model_adds_to_its_doubt(remark, reason):
     assert result.amount > measure_doubt(plain).amount and result.reasons == (reason,)
 
 
+def raise_gable(desk):
+    change = {"type": "gable", "ridge_height": 12.0}
+    return edit(desk, desk.building(ID)["parts"], action="change", part=0, change=change)
+
+
 def test_every_edit_gives_a_valid_model(desk):
-    start = desk.building(ID)
-    gable = edit(
-        desk,
-        start["parts"],
-        action="change",
-        part=0,
-        change={"type": "gable", "ridge_height": 12.0},
-    )
+    gable = raise_gable(desk)
     halves = edit(desk, gable["parts"], action="split", part=0)
     assert len(halves["parts"]) == 2 and halves["figures"]["volume_m3"] == pytest.approx(
         gable["figures"]["volume_m3"], abs=0.2
@@ -177,14 +175,7 @@ def test_every_edit_gives_a_valid_model(desk):
 
 
 def test_what_is_held_is_not_refitted(desk):
-    start = desk.building(ID)
-    raised = edit(
-        desk,
-        start["parts"],
-        action="change",
-        part=0,
-        change={"type": "gable", "ridge_height": 12.0},
-    )
+    raised = raise_gable(desk)
     fixed = edit(desk, raised["parts"], action="refit", held={"0": ["height", "z"]})
     assert fixed["figures"]["ridge_height"] == pytest.approx(12.0, abs=0.01)
     assert edit(desk, raised["parts"], action="refit")["figures"]["ridge_height"] == pytest.approx(

@@ -1,7 +1,5 @@
 """The Energy ADE: valid by its schema, and the same areas as the attributes."""
 
-from pathlib import Path
-
 import pytest
 from click.testing import CliRunner
 from lxml import etree
@@ -13,8 +11,8 @@ from hiproof.errors import InputError
 from hiproof.settings import EnrichSettings
 from hiproof.write.citygml.version2 import NAMESPACES
 from streets import lose_house, place_house, write_street
+from written_run import require_schema
 
-SCHEMA = Path(__file__).parents[3] / "shared/schemas/energy_ade/CityGML_EnergyADE.xsd"
 NAMES = {**NAMESPACES, "energy": ENERGY_NAMESPACE}
 ID, HREF = f"{{{NAMESPACES['gml']}}}id", f"{{{NAMESPACES['xlink']}}}href"
 ADE = EnrichSettings(energy_ade=True)
@@ -39,10 +37,7 @@ def find(element, path):
 
 
 def test_valid_by_the_schema_of_the_ade(root):
-    if not SCHEMA.exists():
-        pytest.skip("needs the schema of the Energy ADE in ../shared/schemas")
-    parser = etree.XMLParser(no_network=True, huge_tree=True)
-    etree.XMLSchema(etree.parse(SCHEMA, parser)).assertValid(root)
+    require_schema("energy_ade", "CityGML_EnergyADE.xsd").assertValid(root)
 
 
 def test_areas_of_boundaries_are_those_of_the_attributes(root):

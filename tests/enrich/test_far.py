@@ -14,6 +14,7 @@ from hiproof.enrich.far import MIDDLES_DEG, TerrainHorizon, read_horizon
 from hiproof.enrich.run import enrich_run
 from hiproof.errors import InputError
 from hiproof.settings import EnrichSettings
+from layers import write_raster
 from streets import WORLD, open_street, place_house, write_street
 
 rasterio = pytest.importorskip("rasterio", reason="needs the extra terrain")
@@ -30,17 +31,11 @@ def read_few_places(monkeypatch):
 
 def write_hill(path, side=9000.0, pixel=25.0, ground=0.0):
     """Write level ground with a hill in the south that ends in a plain above."""
-    from rasterio.transform import from_origin
-
     count = int(side / pixel)
     south = (np.arange(count) + 0.5) * pixel - side / 2
     rise = np.clip((south - HILL_M) * SLOPE, 0.0, FOOT_M * SLOPE)
     heights = ground + np.repeat(rise[:, None], count, axis=1).astype("float32")
-    corner = from_origin(WORLD[0] - side / 2, WORLD[1] + side / 2, pixel, pixel)
-    shape = {"width": count, "height": count, "count": 1, "dtype": "float32"}
-    with rasterio.open(path, "w", crs="EPSG:28992", transform=corner, **shape) as file:
-        file.write(heights, 1)
-    return str(path)
+    return write_raster(path, heights, WORLD[0] - side / 2, WORLD[1] + side / 2, pixel)
 
 
 def write_horizon(path, heights):

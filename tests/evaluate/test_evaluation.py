@@ -9,7 +9,6 @@ import math
 import numpy as np
 import pytest
 import shapely
-from pyogrio import raw
 
 from hiproof.cli.app import import_command
 from hiproof.cli.evaluate import evaluate
@@ -26,6 +25,7 @@ from hiproof.evaluate.evaluation import (
 from hiproof.evaluate.metrics import plan_outline
 from hiproof.evaluate.models import BuildingModel
 from hiproof.evaluate.run import evaluate_run, outline_of_solid
+from layers import write_layer
 from sample_models import ORIGIN, courtyard_solid, gable_solid, write_sample_run
 
 
@@ -138,15 +138,8 @@ def test_footprints_are_found_by_the_column_that_named_the_buildings(tmp_path, i
     areas = [outline_of_solid(BuildingModel(id, {}, solid)) for id, solid in solids.items()]
     areas.append(shapely.transform(areas[0], lambda xy: xy + 200.0))
     names = np.array([*solids, "bare"], dtype=object)
-    columns = [np.roll(names, 1), names]  # the usual column holds the names of others
-    raw.write(
-        tmp_path / "a.gpkg",
-        shapely.to_wkb(areas),
-        columns,
-        ["id", "nr"],
-        geometry_type="Polygon",
-        crs="EPSG:28992",
-    )
+    columns = {"id": np.roll(names, 1), "nr": names}  # the usual one holds the names of others
+    write_layer(tmp_path / "a.gpkg", areas, columns)
     inputs = {"footprints": str(tmp_path / "a.gpkg"), "id_attribute": "nr" if is_told else None}
     (tmp_path / "run.json").write_text(json.dumps({"inputs": inputs, "crs": "EPSG:7415"}))
     result = evaluate_run(tmp_path).footprints

@@ -14,8 +14,6 @@ from hypothesis import strategies as st
 import hiproof
 from hiproof import Grade
 from hiproof.city.folder.ledger import Ledger
-from hiproof.city.request import Request
-from hiproof.city.run import reconstruct_area
 from hiproof.cli.running import graded_words
 from hiproof.cli.status import describe, read_state
 from hiproof.compose import compose
@@ -25,7 +23,8 @@ from hiproof.model.heights import find_highest
 from hiproof.settings import Settings
 from hiproof.simulate import random_compound
 from points_of_roofs import sample_heights
-from tiny_town import make_town, write_cloud, write_footprints
+from run_records import run_points
+from tiny_town import make_town
 
 OUTLINE = shapely.box(0.0, 0.0, 12.0, 9.0)
 
@@ -242,14 +241,10 @@ def run_over_spire(folder, code, max_points=20_000):
         ]
     )
     classes = np.append(town.classification, np.full(60, code, np.uint8))
-    cloud = write_cloud(folder / "cloud.laz", np.concatenate([town.xyz, spire]), classes)
-    footprints = write_footprints(folder / "footprints.geojson", town.footprints)
     settings = Settings.from_dict({"city": {"max_points_a_building": max_points}})
-    summary = reconstruct_area(
-        Request((str(cloud),), folder / "out", str(footprints), settings=settings)
-    )
-    (row,) = hiproof.read_parameters(folder / "out" / "parameters.jsonl")
-    return row, summary
+    xyz = np.concatenate([town.xyz, spire])
+    rows, summary = run_points(folder, xyz, classes, town.footprints, settings=settings)
+    return rows["house-0"], summary
 
 
 @pytest.mark.parametrize(("code", "max_points"), [(6, 20_000), (6, 1000), (18, 20_000)])

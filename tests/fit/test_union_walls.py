@@ -8,6 +8,7 @@ from scipy.spatial import cKDTree
 from hiproof.fit.union.plan import FACADE_BORDER_M, find_roof_points, measure_depth, ring_edges
 from hiproof.fit.walls import STEEPEST_ROOF, WALL_REACH_SPACINGS
 from hiproof.fit.walls import on_walls as found_on_walls
+from points_of_roofs import scatter
 from union_scenes import OUTLINES
 
 
@@ -16,10 +17,8 @@ def scan_hip(rng, outline, density, pitch):
 
     It has one `pitch`, and eaves 5 m high. Also returns the points' depth (n,).
     """
-    x0, y0, x1, y1 = outline.bounds
-    xy = rng.uniform((x0, y0), (x1, y1), (int(density * (x1 - x0) * (y1 - y0)), 2))
+    xy = scatter(outline, rng, density)
     depth = measure_depth(xy[:, 0].copy(), xy[:, 1].copy(), *ring_edges(outline))
-    xy, depth = xy[depth >= 0.0], depth[depth >= 0.0]
     return np.column_stack([xy, 5.0 + pitch * depth]), depth
 
 

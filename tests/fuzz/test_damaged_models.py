@@ -111,20 +111,20 @@ def test_damaged_files_cannot_be_checked(run_folder, tmp_path_factory):
         assert code == 2 and output.startswith("expected") and "got" in output, name
 
 
-def test_damaged_buildings_count_as_invalid(run_folder, tmp_path_factory, capsys):
-    for name, content in cases(damaged_models, tmp_path_factory).items():
+@pytest.mark.parametrize(
+    ("write", "told"),
+    [
+        (damaged_models, "1 solid, 1 valid, 0 invalid, 1 damaged building left out"),
+        (invalid_models, "2 solids, 1 valid, 1 invalid"),
+    ],
+)
+def test_damaged_buildings_and_solids_that_are_none_are_invalid(
+    write, told, run_folder, tmp_path_factory, capsys
+):
+    for name, content in cases(write, tmp_path_factory).items():
         (run_folder / MODELS).write_bytes(content)
         assert answer(count_bad_solids, run_folder / MODELS)[0] == 1, name
-        assert (
-            "1 solid, 1 valid, 0 invalid, 1 damaged building left out" in capsys.readouterr().out
-        ), name
-
-
-def test_solids_that_are_none_are_found_invalid(run_folder, tmp_path_factory, capsys):
-    for name, content in cases(invalid_models, tmp_path_factory).items():
-        (run_folder / MODELS).write_bytes(content)
-        assert answer(count_bad_solids, run_folder / MODELS)[0] == 1, name
-        assert "2 solids, 1 valid, 1 invalid" in capsys.readouterr().out, name
+        assert told in capsys.readouterr().out, name
 
 
 @pytest.mark.parametrize("command", COMMANDS)

@@ -11,7 +11,6 @@ import warnings
 
 import pytest
 
-import planted
 from fuzz.damaged_models import change, sound_lines
 from hiproof import cli
 from hiproof.city import run as city_run
@@ -23,11 +22,10 @@ from tiny_town import make_town, write_town
 
 
 @pytest.fixture
-def hiproof(monkeypatch):
+def hiproof(monkeypatch, quick_tiles):
     """Runs the command line in this process; gives its exit code."""
     monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)
     monkeypatch.setattr(news, "listener", news.listener)
-    monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
 
     def run(*arguments):
         monkeypatch.setattr(sys, "argv", ["hiproof", *map(str, arguments)])

@@ -4,7 +4,6 @@ above.
 
 import itertools
 import json
-import sqlite3
 import struct
 
 import numpy as np
@@ -19,7 +18,7 @@ from hiproof.read.outlines.polygons import (
     is_surface,
     simple_polygons,
 )
-from layers import write_layer
+from layers import opened_geopackage, write_layer
 
 pytestmark = pytest.mark.filterwarnings("ignore::hiproof.errors.InputWarning")
 X, Y = 500000.0, 4649776.0
@@ -103,11 +102,7 @@ def write(path, declared, *geometries):
     ids = [f"h{i}" for i in range(len(geometries))]
     boxes = [shapely.box(X, Y, X + 1, Y + 1)] * len(geometries)
     write_layer(path, boxes, {"id": ids}, "EPSG:32633", SPATIAL_INDEX="NO")
-    with sqlite3.connect(path) as base:
-        for (trigger,) in base.execute(
-            "select name from sqlite_master where type = 'trigger'"
-        ).fetchall():
-            base.execute(f'drop trigger "{trigger}"')
+    with opened_geopackage(path) as base:
         head = b"GP\0\1" + struct.pack("<i", 32633)
         rows = [(head + geometry, id) for geometry, id in zip(geometries, ids, strict=True)]
         base.executemany(f"update {path.stem} set geom = ? where id = ?", rows)

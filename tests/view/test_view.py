@@ -189,6 +189,17 @@ SUN = (
 )
 
 
+def ask_page(models, script, serving, folder):
+    """What a script at the end of the page says of models."""
+    with pytest.warns(UserWarning, match="no CRS"):
+        write_models(folder / "a.3dtiles", models)
+    page = render_page("run").replace("</body>", script + "</body>")
+    text = render_document(page, folder / "a.3dtiles", serving, folder / "profile")
+    answer = re.search(r'<pre id="said">(.*?)</pre>', text, re.DOTALL)
+    assert answer, f"the page's scripts did not run to their end: {text[-2000:]}"
+    return json.loads(answer[1])
+
+
 @needs_browser
 def test_roofs_have_the_colours_of_the_sun_where_it_is_known(serving, tmp_path):
     areas = {"hiproof_flat_roof_area_m2": 20.0, "hiproof_sloped_roof_area_m2": 60.0}
@@ -198,13 +209,7 @@ def test_roofs_have_the_colours_of_the_sun_where_it_is_known(serving, tmp_path):
         ViewedModel(id, kind, solid, {**areas, **sky, "hiproof_roof_sun_kwh": sun}, {0: kind})
         for (id, (kind, solid)), sun in zip(SOLIDS.items(), suns, strict=False)
     ]
-    with pytest.warns(UserWarning, match="no CRS"):
-        write_models(tmp_path / "a.3dtiles", models)
-    page = render_page("run").replace("</body>", SUN + "</body>")
-    text = render_document(page, tmp_path / "a.3dtiles", serving, tmp_path / "profile")
-    answer = re.search(r'<pre id="said">(.*?)</pre>', text, re.DOTALL)
-    assert answer, f"the page's scripts did not run to their end: {text[-2000:]}"
-    say = json.loads(answer[1])
+    say = ask_page(models, SUN, serving, tmp_path)
     assert not say["hidden"] and say["back"] == say["types"] != say["sun"]
     assert "from 800 kWh/m² (clear sky)" in say["legend"]
     colours = [colour for least, colour in SUN_STOPS if least == 1100.0] + [UNKNOWN_COLOUR]
@@ -221,13 +226,7 @@ def test_roofs_have_the_colours_of_an_update_where_one_is_told(serving, tmp_path
         ViewedModel(id, kind, solid, told, {0: kind})
         for (id, (kind, solid)), told in zip(SOLIDS.items(), changes, strict=False)
     ]
-    with pytest.warns(UserWarning, match="no CRS"):
-        write_models(tmp_path / "a.3dtiles", models)
-    page = render_page("run").replace("</body>", SUN.replace('"sun"', '"change"') + "</body>")
-    text = render_document(page, tmp_path / "a.3dtiles", serving, tmp_path / "profile")
-    answer = re.search(r'<pre id="said">(.*?)</pre>', text, re.DOTALL)
-    assert answer, f"the page's scripts did not run to their end: {text[-2000:]}"
-    say = json.loads(answer[1])
+    say = ask_page(models, SUN.replace('"sun"', '"change"'), serving, tmp_path)
     expected = [told.get("hiproof_change") for told in changes[: len(models)]]
     named = {name for name in expected if name} | {"unchanged"}
     assert set(say["legend"].split()) == named and say["back"] == say["types"]

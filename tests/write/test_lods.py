@@ -4,7 +4,6 @@ import json
 import re
 import sqlite3
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pyogrio
@@ -35,11 +34,11 @@ from hiproof.write.citygml.version2 import CODE_SPACES, NAMESPACES, CityGMLWrite
 from hiproof.write.citygml.version3 import CityGML3Writer
 from hiproof.write.colours import ROOF_COLOURS, list_legend, type_colour
 from hiproof.write.tables.styles import STYLES, TABLE
+from written_run import require_schema
 
 ALL = ("0", "1.2", "1.3", "2.2")
 WHOLE = WriteSettings(lods=ALL)
 IN_PARTS = WriteSettings(lods=ALL, parts_as="buildingparts", roof_codes="adv")
-SCHEMA = Path(__file__).parents[2].parent / "shared/schemas/citygml2/CityGML.xsd"
 
 
 def terrace(id="terrace"):
@@ -115,10 +114,8 @@ def test_the_envelope_holds_a_footprint_that_was_moved(tmp_path, shift, lower, u
 
 @pytest.mark.parametrize("write", [WHOLE, IN_PARTS], ids=["whole", "parts"])
 def test_citygml_stays_within_its_schema(tmp_path, write):
-    if not SCHEMA.exists():
-        pytest.skip("needs the schemas of CityGML 2.0 in ../shared/schemas")
     root = gml(tmp_path, [terrace(), make_lost_building()], write)
-    etree.XMLSchema(etree.parse(SCHEMA)).assertValid(root.getroottree())
+    require_schema("citygml2").assertValid(root.getroottree())
 
 
 def test_levels_of_detail_have_the_heights_that_the_rule_says(tmp_path):

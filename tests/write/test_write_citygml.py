@@ -3,7 +3,6 @@
 import datetime
 import itertools
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pyogrio
@@ -17,8 +16,8 @@ from hiproof.write.citygml.version2 import NAMESPACES, CityGMLWriter, write_city
 from hiproof.write.head import FileHead
 from hiproof.write.naming import gml_name
 from hiproof.write.values import xml_attribute, xml_text
+from written_run import require_schema
 
-SCHEMA = Path(__file__).parents[3] / "shared" / "schemas" / "citygml2" / "CityGML.xsd"
 GML_ID, HREF = f"{{{NAMESPACES['gml']}}}id", f"{{{NAMESPACES['xlink']}}}href"
 
 
@@ -46,9 +45,7 @@ def find(root, path):
 
 @pytest.fixture(scope="module")
 def schema():
-    if not SCHEMA.exists():
-        pytest.skip(f"needs the CityGML 2.0 schema at {SCHEMA}")
-    return etree.XMLSchema(etree.parse(SCHEMA))
+    return require_schema("citygml2")
 
 
 @pytest.mark.parametrize("crs", ["EPSG:7415", "EPSG:28992", None])

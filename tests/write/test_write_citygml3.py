@@ -1,8 +1,6 @@
 """CityGML 3.0 against what 2.0 tells of the same buildings, and against OGC's schemas."""
 
 import datetime
-import functools
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,8 +13,8 @@ from hiproof.write.citygml.version2 import CityGMLWriter
 from hiproof.write.citygml.version3 import ID, NAMESPACES_3, CityGML3Writer, upgrade_member
 from hiproof.write.fragments import Fragment
 from hiproof.write.head import FileHead
+from written_run import require_schema
 
-SCHEMA = Path(__file__).parents[3] / "shared" / "schemas" / "citygml3" / "CityGML.xsd"
 HREF = f"{{{NAMESPACES_3['xlink']}}}href"
 
 WITH_ID = ("CityModel", "Building", "BuildingPart", "RoofSurface", "WallSurface", "GroundSurface")
@@ -66,13 +64,6 @@ def new(root, path):
     return root.xpath(path, namespaces=NAMESPACES_3)
 
 
-@functools.cache
-def load_schema():
-    if not SCHEMA.exists():
-        pytest.skip(f"needs the CityGML 3.0 schema at {SCHEMA}")
-    return etree.XMLSchema(etree.parse(SCHEMA, etree.XMLParser(no_network=True, huge_tree=True)))
-
-
 def assert_told_as_the_schemas_ask(root):
     ids = new(root, "//@gml:id")
     assert len(set(ids)) == len(ids)
@@ -84,7 +75,7 @@ def assert_told_as_the_schemas_ask(root):
     assert {child.tag for child in new(root, "//gml:Solid/gml:exterior/*")} <= {
         f"{{{NAMESPACES_3['gml']}}}Shell"
     }
-    load_schema().assertValid(etree.fromstring(etree.tostring(root)))
+    require_schema("citygml3").assertValid(etree.fromstring(etree.tostring(root)))
 
 
 def test_order_names_and_ids_are_as_the_schemas_ask(roots):
