@@ -98,6 +98,8 @@ def fit_roof(
         estimate = fit_within_hull(local, estimate)
     if outline is None and estimate.primitive.name in REGULAR:
         estimate = make_regular(local, estimate)
+    if outline is not None and estimate.primitive.name == "barrel":
+        estimate = fit_at_right_angles(local, estimate)
     return as_fit(estimate, frame, len(local))
 
 
@@ -124,6 +126,21 @@ def fit_within_hull(cloud: np.ndarray, estimate: Estimate) -> Estimate:
         slopes = np.hypot(*shape.plane_values(theta)[:, :2].T)
         reach_m = HULL_SIGMAS * noise.sigma * math.hypot(1.0, float(slopes.mean()))
     return replace(estimate, theta=theta, noise=noise)
+
+
+def fit_at_right_angles(cloud: np.ndarray, estimate: Estimate) -> Estimate:
+    """Fit the heights of a vault over a given plan again, by distances at right angles.
+
+    Points (n, 4) that lie beside their place in plan lie far off in height where it is steep. A
+    vault ends where its walls do, or within them: it errs as far as points alone tell another one.
+    """
+    shape = estimate.primitive
+    theta, noise = fit_heights(cloud, shape, estimate.theta)
+    by_points, _ = fit_heights(cloud, shape, theta, (HALF_WIDTH,))
+    error = by_points - theta
+    error[HALF_LENGTH] = 0.0
+    covariance = find_covariance(cloud, shape, theta, ()) + np.outer(error, error)
+    return replace(estimate, theta=theta, covariance=covariance, noise=noise)
 
 
 def make_regular(cloud: np.ndarray, estimate: Estimate) -> Estimate:

@@ -55,6 +55,7 @@ RIDGE = 1e-6  # It keeps what no point determines.
 GROWTH = 3.0  # A shape reaches out to so many times the radius with which it begins at most.
 GROWTH_ROUNDS = 2  # Rounds in which a shape is fitted to all points that follow it.
 FOLLOW_M = 0.12  # Distance (m), at right angles, within which a point follows a slope.
+MOST_OVER = 0.5  # The same above it, in FOLLOW_M: beside a spire on a tower all points lie there.
 SLOPES_TRIED, BENDS_TRIED = 24, 7  # Slopes, in equal ratios, and bends of an onion that are tried.
 TURNS_TRIED = 3  # Turns of a spire that are tried within one of its facets.
 TOP_FOLLOW_M = 0.5  # Points so near (m in height) to a steep top lie on it.
@@ -189,26 +190,27 @@ def fit_followers(
     """
     from ..likelihood import fit_heights  # compiled code that most roofs never need
 
-    numbers, spacing = len(free) + shape.theta_size - Q0, 0.0
+    numbers, variance = len(free) + shape.theta_size - Q0, 0.0
     inside = points[shapely.contains_xy(shape.part(theta).pieces[0].outline, *points[:, :2].T)]
     turns = np.arange(TURNS_TRIED if KAPPA in free else 1) * 2.0 * math.pi / len(shape.rim)
     theta = find_start(inside, shape, theta, turns / TURNS_TRIED)
     for _ in range(GROWTH_ROUNDS):
-        near = inside[follow(inside, shape, theta, 3.0)]
+        near = inside[np.abs(measure_gaps(inside, shape, theta)) <= 3.0]
         if len(near) < max(FEWEST_POINTS, 2 * numbers):
             return None
         theta, _ = fit_heights(weigh(near), shape, theta, free)
         if grows:
-            r = np.hypot(*(points[:, :2] - theta[:2]).T)
+            r, gaps = measure_radii(points, shape, theta), measure_gaps(points, shape, theta)
             order = np.argsort(r, kind="stable")
-            score = np.cumsum(np.where(follow(points, shape, theta)[order], 1, -1))
-            last = int(np.argmax(score))
+            follows = (gaps >= -1.0) & (gaps <= MOST_OVER)
+            last = int(np.argmax(np.cumsum(np.where(follows[order], 1, -1))))
             theta[[HALF_WIDTH, HALF_LENGTH]] = r[order[last]]
             inside = points[order[: last + 1]]
-            spacing = r[order[last]] / math.sqrt(last + 1.0)
+            variance = (MOST_OVER * FOLLOW_M) ** 2 * (1.0 + 1.0 / add_slopes(shape, theta) ** 2)
+            variance += (r[order[last]] / (last + 1.0)) ** 2
     if shape.minima:  # Points on a steep needle lie far off in height.
         theta, _ = fit_heights(weigh(inside), shape, theta, free)
-    part = make_part(inside, shape, theta, free, spacing**2)
+    part = make_part(inside, shape, theta, free, variance)
     return part if is_top_seen(part, inside) else None
 
 
@@ -217,13 +219,25 @@ def weigh(points: np.ndarray) -> np.ndarray:
     return np.column_stack([points, np.ones(len(points))])
 
 
-def follow(
-    points: np.ndarray, shape: Primitive, theta: np.ndarray, loose: float = 1.0
-) -> np.ndarray:
-    """Return which points (n, 3) lie near a shape, the steeper it is the farther off in height."""
-    slope = theta[Q1 : Q1 + len(shape.bounds)].sum()
-    reach = loose * FOLLOW_M * math.hypot(1.0, slope)
-    return np.abs(points[:, 2] - shape.height_at(theta, points[:, :2])) <= reach
+def add_slopes(shape: Primitive, theta: np.ndarray) -> float:
+    """Return the rise over run of a shape, its bends included."""
+    return float(theta[Q1 : Q1 + len(shape.bounds)].sum())
+
+
+def measure_gaps(points: np.ndarray, shape: Primitive, theta: np.ndarray) -> np.ndarray:
+    """Return how far points (n, 3) lie above a shape, at right angles, in FOLLOW_M."""
+    reach = FOLLOW_M * math.hypot(1.0, add_slopes(shape, theta))
+    return (points[:, 2] - shape.height_at(theta, points[:, :2])) / reach
+
+
+def measure_radii(points: np.ndarray, shape: Primitive, theta: np.ndarray) -> np.ndarray:
+    """Return half the width (n,) of the plan whose rim passes through each point (n, 3)."""
+    c, s = math.cos(theta[KAPPA]), math.sin(theta[KAPPA])
+    rim = np.array(shape.rim)
+    x, y = (np.roll(rim, -1, axis=0) - rim).T
+    normals = np.column_stack([y, -x])
+    normals /= (normals * rim).sum(axis=1, keepdims=True)
+    return ((points[:, :2] - theta[:2]) @ [[c, -s], [s, c]] @ normals.T).max(axis=1)
 
 
 def find_start(
@@ -239,7 +253,7 @@ def find_start(
         trial = trials[m].copy()
         trial[KAPPA] += turn
         lows = np.sort(points[:, 2] - shape.height_at(trial, points[:, :2], planes[m]))
-        width = 2.0 * FOLLOW_M * math.hypot(1.0, trial[Q1 : Q1 + len(values)].sum())
+        width = 2.0 * FOLLOW_M * math.hypot(1.0, add_slopes(shape, trial))
         counts = np.searchsorted(lows, lows + width, side="right") - np.arange(len(lows))
         first = int(np.argmax(counts)) if len(counts) else 0
         if len(counts) and counts[first] > most:
