@@ -131,8 +131,9 @@ def improve_beside(roof: Tables, site: Site, whole: Whole) -> tuple[Tables, Site
     """
     trial, drawing = make_tables_like(roof), make_drawing(len(roof.sides))
     cost = improve_all(roof, trial, site, drawing)
-    if add_volumes(roof, trial, site, drawing, whole):
-        cost = improve_all(roof, trial, site, drawing)
+    added = add_volumes(roof, trial, site, drawing, whole)
+    if added.any():
+        cost = improve(roof, trial, site, drawing, added, LOOP_ROUNDS)
     shift = estimate_shift(roof, site)
     if not shift.any():
         return roof, site

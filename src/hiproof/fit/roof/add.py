@@ -25,7 +25,7 @@ from ..union.volumes import DIRECTION, REPLACES, U0
 from ..union.whole import Box, Whole
 from ..union.window import open_window
 from .accept import LEAST_UNITS, improve
-from .draw import Drawing, compute_heights
+from .draw import Drawing, compute_heights, is_near
 from .price import OVER_M, Site
 from .start import add_volume, put_on_walls
 from .tables import VOLUME_COUNT, Tables, copy_tables, make_tables_like
@@ -40,16 +40,23 @@ TRIED = 2  # Candidates that join, and that replace, those that gain most.
 ROWS = np.array([1, 16, 16])  # Most volumes, lines and unknowns that a new volume takes.
 
 
-def add_volumes(roof: Tables, trial: Tables, site: Site, drawing: Drawing, whole: Whole) -> bool:
-    """Add volumes to a roof at each place where that saves. Returns whether any was added."""
-    nobody = np.zeros(len(roof.sides), np.bool_)
-    start = price = improve(roof, trial, site, drawing, nobody, 1)
+def add_volumes(
+    roof: Tables, trial: Tables, site: Site, drawing: Drawing, whole: Whole
+) -> np.ndarray:
+    """Add volumes to a roof at each place where that saves.
+
+    Returns which volumes (v,) of the roof then lie where any was added.
+    """
+    nobody, windows = np.zeros(len(roof.sides), np.bool_), []
+    price = improve(roof, trial, site, drawing, nobody, 1)
     for box in list_places(roof, site):
-        scene, last = open_window(whole, box, EFFORT.pool_points), np.inf
+        scene, start, last = open_window(whole, box, EFFORT.pool_points), price, np.inf
         while scene is not None and price < last:
             last = price
             price = add_best(roof, trial, site, drawing, scene, price)
-    return price < start
+        if price < start:
+            windows.append(box)
+    return np.array([any(is_near(b, w, 0.0) for w in windows) for b in roof.boxes])
 
 
 def list_places(roof: Tables, site: Site) -> Iterator[Box]:

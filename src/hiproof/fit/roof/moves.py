@@ -39,7 +39,6 @@ from .tables import (
     MERGE,  # volume b into a, whose planes then face as c says (0: as they do), with b's if d
     FACE,  # planes of volume a face as b says
     TURN,  # volume a replaces instead of joining, or joins
-    GIVE,  # volume a a plane from its side b, with the slope c and the height d of others
     GIVE_WALL,  # volume a a plane from line b of the outline, with slope c and height d of others
     LEVEL_EAVES,  # all sloping planes of volume a rise from its sides at one height, with one slope
     # if b, and from all walls that cut its corners off if c
@@ -50,7 +49,7 @@ from .tables import (
     COVER,  # side b of volume a on line c of the outline, with all planes from its walls' eaves
     TO_EAVE,  # plane b of volume a rises from height c, and so does the side that it faces
     TO_POINTS,  # side b of volume a where points say that it ends, as it leans
-) = range(19)
+) = range(18)
 MOVE_COLUMNS = 5  # Numbers of a move: its kind and four more.
 # Planes face square to their sides, along the axis between two sides, or square to either.
 FACE_SIDES, FACE_AXIS, FACE_FIRST, FACE_SECOND = 1, 2, 3, 4
@@ -292,7 +291,7 @@ def note_line(half, x, y, a, b, c, kind, number, near, found):
 
 @compiled
 def list_new_planes(roof, site, k, moves, count):
-    """Write planes over further sides of volume k, and over walls that cut its corners off."""
+    """Write planes of volume k over walls that have none yet."""
     if roof.n_planes[k] >= VOLUME_PLANES or site.keeps_shapes:
         return count
     for p in range(roof.n_planes[k]):
@@ -305,9 +304,6 @@ def list_new_planes(roof, site, k, moves, count):
             )
         if not is_first:
             continue
-        for s in range(N_SIDES):
-            if not is_faced(roof, k, roof.half_planes[k, s, 0], roof.half_planes[k, s, 1]):
-                count = write_move(moves, count, GIVE, k, s, roof.slopes[k, p], roof.heights[k, p])
         for m in range(len(site.lines)):
             if stands_in(roof, k, site.lines[m]):
                 count = write_move(
@@ -422,9 +418,6 @@ def find_new_side(roof, kind, k, s, number, site):
 def change_plane(roof, move, site):
     """Give, take, tilt or level one plane of a volume. Returns whether the move is possible."""
     kind, k, b, c, d = move[0], move[1], move[2], move[3], move[4]
-    if kind == GIVE:
-        add_plane(roof, k, roof.sides[k, b], d, c)
-        return True
     if kind == GIVE_WALL:
         line = site.lines[b]
         add_plane(roof, k, add_line(roof, line[0], line[1], line[2]), d, c)
