@@ -3,9 +3,12 @@
 import numpy as np
 import pytest
 import shapely
+from shapely import affinity
 
 from hiproof import reconstruct
 from hiproof.fit.neighbour_roofs import find_neighbour_roofs
+from hiproof.frames import LocalFrame
+from hiproof.stages.points import drop_neighbour_roofs
 
 
 def draw_pair(rng, density=6.0, step=None, overhang=None):
@@ -69,3 +72,31 @@ def test_the_order_of_points_and_a_neighbour_elsewhere_do_not_matter():
     one = reconstruct(points, lower, neighbours=[higher])
     other = reconstruct(rng.permutation(points), lower, neighbours=[distant, higher])
     assert one.parts[0].parameters == other.parts[0].parameters
+
+
+@pytest.mark.parametrize("seed", [484, 1031, 1474, 2194])
+def test_an_outline_cut_in_turned_axes_leaves_its_neighbours_whole(seed):
+    """Its corners lie a last bit beside theirs, for which GEOS finds holes outside of shells."""
+    rng = np.random.default_rng(seed)
+    base = np.array([85000.0, 447000.0]) + rng.integers(0, 500, 2)
+    angle, w, h = rng.uniform(0, 90), rng.uniform(8, 14), rng.uniform(6, 9)
+    _, b = rng.uniform(4, 8), rng.uniform(3, 5)
+
+    def place(*corners):
+        turned = affinity.rotate(shapely.Polygon(corners), angle, origin=(0, 0))
+        return shapely.transform(turned, lambda xy: np.round(xy, 3) + base)
+
+    house = place((0, 0), (w, 0), (w, b), (w + 3, b), (w + 3, h), (0, h))
+    beside = place((w, 0), (w + 3.5, 0.2), (w + 3.5, b), (w, b))
+    behind = place((-1, h), (w + 3, h), (w + 1, h + 5), (-1, h + 6))
+    frame = LocalFrame(np.array([*np.round(house.centroid.coords[0], 3), 0.0]))
+    cosine, sine = np.cos(t := np.radians(angle) + rng.normal(0, 1e-4)), np.sin(t)
+    turn = np.array([[cosine, -sine], [sine, cosine]])
+    turned = shapely.transform(house, lambda xy: frame.to_local(xy) @ turn)
+    _, y0, x1, y1 = turned.bounds
+    bare = shapely.box(x1 - rng.uniform(2, 5), y0 - 1, x1 + 1, y1 + 1)
+    outline = shapely.transform(shapely.difference(turned, bare), lambda xy: xy @ turn.T)
+    points = np.column_stack([rng.uniform(-3, 3, (200, 2)), np.full(200, 6.0)])
+    around = np.vstack([points, points + [9.0, 0.0, 0.0]]) + frame.origin
+    kept = drop_neighbour_roofs(points, outline, around, [beside, behind], frame)
+    assert len(kept) == len(points)

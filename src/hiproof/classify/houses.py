@@ -177,7 +177,7 @@ def without_necks(area: shapely.Geometry, gap_m: float, roofs: Roofs) -> list[sh
     for part in shapely.get_parts(wide):
         side = shapely.buffer(part, 0.5 * NECK_M, join_style="mitre")
         sides.append(with_area(shapely.intersection(remainder, side)))
-        remainder = with_area(shapely.difference(remainder, side))
+        remainder = with_area(shapely.difference(remainder, side, grid_size=OVERLAY_GRID_M))
     return with_crumbs([*sides, *shapely.get_parts(remainder)], roofs)
 
 
