@@ -25,7 +25,7 @@ from ..union.volumes import DIRECTION, REPLACES, U0
 from ..union.whole import Box, Whole
 from ..union.window import open_window
 from .accept import LEAST_UNITS, improve
-from .draw import Drawing, compute_heights, is_near
+from .draw import Drawing, compute_heights
 from .price import OVER_M, Site
 from .start import add_volume, put_on_walls
 from .tables import VOLUME_COUNT, Tables, copy_tables, make_tables_like
@@ -56,7 +56,10 @@ def add_volumes(
             price = add_best(roof, trial, site, drawing, scene, price)
         if price < start:
             windows.append(box)
-    return np.array([any(is_near(b, w, 0.0) for w in windows) for b in roof.boxes])
+    (x0, x1, y0, y1), near = roof.boxes.T, np.zeros(len(roof.sides), np.bool_)
+    for u0, u1, v0, v1 in windows:
+        near |= (x0 < u1) & (x1 > u0) & (y0 < v1) & (y1 > v0)
+    return near
 
 
 def list_places(roof: Tables, site: Site) -> Iterator[Box]:
