@@ -94,6 +94,13 @@ def test_names_that_proj_does_not_read_are_understood(name, tmp_path):
     assert run.crs == hiproof.read.parse_crs(ADV[name])
 
 
+def test_a_name_whose_plan_is_not_of_epsg_is_not_taken_for_its_heights_alone(tmp_path):
+    name = "http://www.opengis.net/def/crs-compound?1=http://www.opengis.net/def/crs/OGC/1.3/CRS84"
+    name += "&amp;2=http://www.opengis.net/def/crs/EPSG/0/5773"
+    with pytest.warns(InputWarning, match="names a CRS that PROJ does not know"):
+        convert(write_gml(tmp_path / "a.gml", name), tmp_path / "a.gpkg")
+
+
 @pytest.mark.parametrize("crs", ["EPSG:25832", "urn:adv:crs:ETRS89_UTM32*DE_DHHN2016_NH"])
 @pytest.mark.parametrize("name", [UNKNOWN, "EPSG:3068", *ADV])
 def test_a_crs_by_hand_counts_whatever_the_file_names(name, crs, tmp_path):

@@ -272,7 +272,7 @@ def find_deviations(
     Gradients of the named formulas go through theta's covariance (9, 9).
 
     What the points do not tell has none, as in a fit of several parts; what a given outline tells
-    is exact, 0.
+    is exact, 0, but for the width of a vault.
     """
     values = theta[HALF_WIDTH:]
     names = {**shape.measures, "t_z": shape.eave}

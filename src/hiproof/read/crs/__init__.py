@@ -39,7 +39,9 @@ ADV_NAMES = {
 
 # Names by EPSG codes that PROJ does not read: of GML 3.1, of plan and heights, without a version.
 EPSG_NAME = re.compile(
-    r"https?://\S*(?:epsg\.xml#\d+|/def/crs-compound\?\S+)|EPSG::\d+", re.IGNORECASE
+    r"https?://\S*(?:epsg\.xml#\d+|/def/crs-compound\?(?:[^&\s]*/EPSG/[^/&\s]*/\d+(?:&|$))+)"
+    r"|EPSG::\d+",
+    re.IGNORECASE,
 )
 EPSG_CODE = re.compile(r"(?:epsg\.xml#|/EPSG/[^/&]*/|EPSG::)(\d+)", re.IGNORECASE)
 
