@@ -31,7 +31,7 @@ def write_raster(path, heights, west, north, step=1.0, crs="EPSG:28992", **optio
 
 
 @contextmanager
-def opened_geopackage(path):
+def open_geopackage(path):
     """The database of a layer that was written with SPATIAL_INDEX="NO", which takes any values."""
     with sqlite3.connect(path) as base:
         for (trigger,) in base.execute(

@@ -11,7 +11,7 @@ from hiproof.errors import InputError, InputWarning
 from hiproof.model import Footprint
 from hiproof.read.outlines.footprints import read_footprints
 from hiproof.write.tables.geopackage import attributes_with_a_column
-from layers import opened_geopackage, write_layer
+from layers import open_geopackage, write_layer
 
 SQUARES = [shapely.box(500000 + 20 * i, 4649776, 500010 + 20 * i, 4649786) for i in range(4)]
 
@@ -83,7 +83,7 @@ def test_a_date_of_a_shapefile_that_is_none_is_text(tmp_path):
 def test_text_in_no_encoding_keeps_what_can_be_read(tmp_path):
     path, names = tmp_path / "a.gpkg", {"name": ["Straße", "b", "c", "d"]}
     write_layer(path, SQUARES, names, "EPSG:32633", SPATIAL_INDEX="NO")
-    with opened_geopackage(path) as base:
+    with open_geopackage(path) as base:
         base.execute("update a set name = cast(x'41ff42' as text) where name = 'b'")
     values, remarks = read_values(path, "name")
     assert values == ["Straße", "A\ufffdB", "c", "d"] and len(remarks) == 1

@@ -18,7 +18,7 @@ from hiproof.read.outlines.polygons import (
     is_surface,
     simple_polygons,
 )
-from layers import opened_geopackage, write_layer
+from layers import open_geopackage, write_layer
 
 pytestmark = pytest.mark.filterwarnings("ignore::hiproof.errors.InputWarning")
 X, Y = 500000.0, 4649776.0
@@ -102,7 +102,7 @@ def write(path, declared, *geometries):
     ids = [f"h{i}" for i in range(len(geometries))]
     boxes = [shapely.box(X, Y, X + 1, Y + 1)] * len(geometries)
     write_layer(path, boxes, {"id": ids}, "EPSG:32633", SPATIAL_INDEX="NO")
-    with opened_geopackage(path) as base:
+    with open_geopackage(path) as base:
         head = b"GP\0\1" + struct.pack("<i", 32633)
         rows = [(head + geometry, id) for geometry, id in zip(geometries, ids, strict=True)]
         base.executemany(f"update {path.stem} set geom = ? where id = ?", rows)

@@ -200,13 +200,15 @@ def fit_followers(
             return None
         theta, _ = fit_heights(weigh(near), shape, theta, free)
         if grows:
-            r, gaps = measure_radii(points, shape, theta), measure_gaps(points, shape, theta)
+            slope, gaps = add_slopes(shape, theta), measure_gaps(points, shape, theta)
+            # half the width of a plan whose rim passes through each point, along facets, too
+            r = (theta[Q0] - shape.height_at(theta, points[:, :2])) / slope
             order = np.argsort(r, kind="stable")
             follows = (gaps >= -1.0) & (gaps <= MOST_OVER)
             last = int(np.argmax(np.cumsum(np.where(follows[order], 1, -1))))
             theta[[HALF_WIDTH, HALF_LENGTH]] = r[order[last]]
             inside = points[order[: last + 1]]
-            variance = (MOST_OVER * FOLLOW_M) ** 2 * (1.0 + 1.0 / add_slopes(shape, theta) ** 2)
+            variance = (MOST_OVER * FOLLOW_M) ** 2 * (1.0 + 1.0 / slope**2)
             variance += (r[order[last]] / (last + 1.0)) ** 2
     if shape.minima:  # Points on a steep needle lie far off in height.
         theta, _ = fit_heights(weigh(inside), shape, theta, free)
@@ -228,16 +230,6 @@ def measure_gaps(points: np.ndarray, shape: Primitive, theta: np.ndarray) -> np.
     """Return how far points (n, 3) lie above a shape, at right angles, in FOLLOW_M."""
     reach = FOLLOW_M * math.hypot(1.0, add_slopes(shape, theta))
     return (points[:, 2] - shape.height_at(theta, points[:, :2])) / reach
-
-
-def measure_radii(points: np.ndarray, shape: Primitive, theta: np.ndarray) -> np.ndarray:
-    """Return half the width (n,) of the plan whose rim passes through each point (n, 3)."""
-    c, s = math.cos(theta[KAPPA]), math.sin(theta[KAPPA])
-    rim = np.array(shape.rim)
-    x, y = (np.roll(rim, -1, axis=0) - rim).T
-    normals = np.column_stack([y, -x])
-    normals /= (normals * rim).sum(axis=1, keepdims=True)
-    return ((points[:, :2] - theta[:2]) @ [[c, -s], [s, c]] @ normals.T).max(axis=1)
 
 
 def find_start(
