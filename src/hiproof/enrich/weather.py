@@ -228,8 +228,6 @@ def refuse_other_sun(weather: Weather, path: str) -> None:
         got = f"diffuse and direct radiation {gaps.sum() / total:.0%} off the global"
     elif share < LEAST_CLEARNESS:
         got = f"only {share:.1%} of what reaches the atmosphere in a year"
-    elif dhi.sum() > (1 - LEAST_DIRECT) * total:
-        got = "hardly any direct radiation in a year"
     elif is_dark.any():
         day = weather.times[24 * int(is_dark.argmax())]
         got = (
@@ -240,13 +238,19 @@ def refuse_other_sun(weather: Weather, path: str) -> None:
             f"expected radiation in {path} that fits the sun over its station, got {got}; use "
             "another file"
         )
-    if brightness < LEAST_BRIGHTNESS:
-        warnings.warn(
-            f"{path}: has no clear hours; the brightest have {brightness:.0%} of what reaches the "
-            "atmosphere, and 70 % are usual, so all sun may be too low; check that the unit is "
-            "W/m2",
-            InputWarning,
+    doubt = ""
+    if dhi.sum() > (1 - LEAST_DIRECT) * total:
+        doubt = (
+            "hardly any direct radiation in a year, which no climate has, so slopes that face the "
+            "sun get too little; use a file with direct radiation"
         )
+    elif brightness < LEAST_BRIGHTNESS:
+        doubt = (
+            f"no clear hours; the brightest have {brightness:.0%} of what reaches the atmosphere, "
+            "and 70 % are usual, so all sun may be too low; check that the unit is W/m2"
+        )
+    if doubt:
+        warnings.warn(f"{path}: has {doubt}", InputWarning)
 
 
 def measure_rise(weather: Weather) -> np.ndarray:
