@@ -26,13 +26,13 @@ def run(tmp_path_factory):
     return folder / "models"
 
 
-def update(run, out, cloud, **options):
+def update(run, out, cloud, changes=None, **options):
     """Return the texts of an update's warnings, and its buildings by class."""
     parameters = str(run / "parameters.jsonl")
     options |= {"run": run, "run_parameters": parameters, "date": "2024-05-01"}
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        summary = update_area(UpdateRequest((str(cloud),), out, **options))
+        summary = update_area(UpdateRequest((str(cloud),), out, **options), changes)
     return [str(w.message) for w in caught], summary.by_change
 
 
@@ -75,3 +75,26 @@ def test_where_most_buildings_count_as_changed_the_shift_is_doubted(run, aside, 
     texts, classes = update(run, tmp_path / "out", write_later(tmp_path, aside))
     assert classes["changed"] >= 8
     assert any("count as changed, more than a town has" in text for text in texts)
+
+
+@pytest.mark.parametrize("count", [1, 4, HOUSES])
+def test_new_outlines_beside_their_roofs_are_moved_where_earlier_ones_show_it(run, count, tmp_path):
+    """However few roofs show it: a village stays as it is."""
+    drawn = list(make_town(HOUSES).footprints.items())[:count]
+    beside = {id: shapely.affinity.translate(outline, 1.3) for id, outline in drawn}
+    given = {"footprints": str(write_footprints(tmp_path / "new.geojson", beside))}
+    texts, classes = update(run, tmp_path / "out", write_later(tmp_path), **given)
+    assert classes == {"unchanged": HOUSES}
+    (text,) = texts
+    assert "lie beside their roofs and are moved by (-1." in text
+
+
+def test_houses_built_anew_beside_where_they_stood_are_no_shift(run, tmp_path):
+    """Their new outlines lie on their new roofs."""
+    town = make_town(HOUSES, seed=5)
+    town.xyz[town.classification == 6, 0] += 1.3
+    cloud = write_cloud(tmp_path / "later.laz", town.xyz, town.classification)
+    outlines = {id: shapely.affinity.translate(o, 1.3) for id, o in town.footprints.items()}
+    given = {"footprints": str(write_footprints(tmp_path / "new.geojson", outlines))}
+    _, classes = update(run, tmp_path / "out", cloud, {"read": {"shift": "off"}}, **given)
+    assert classes == {"changed": HOUSES}

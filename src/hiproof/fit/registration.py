@@ -78,7 +78,8 @@ class Registration:
     `xy` is in m, east and north, with standard deviations `sigma` (m).
 
     `squares` had roof points; `agreement` is how much better the shift is than any other one that
-    is far from it, in standard deviations of the sum over the squares.
+    is far from it, in standard deviations of the sum over the squares. `is_confirmed` says that
+    something other than roofs shows the same shift.
     """
 
     xy: tuple[float, float] = (0.0, 0.0)
@@ -86,6 +87,7 @@ class Registration:
     footprints: int = 0
     squares: int = 0
     agreement: float = 0.0
+    is_confirmed: bool = False
 
     @property
     def length(self) -> float:
@@ -94,18 +96,18 @@ class Registration:
     @property
     def is_clear(self) -> bool:
         """Whether the footprints should be moved."""
-        if (
-            self.squares < LEAST_SQUARES
-            or self.footprints < LEAST_FOOTPRINTS
-            or not self.length >= SMALLEST_SHIFT_M
-        ):
-            return False
-        sigma = max(self.sigma)
-        return (
-            sigma <= MOST_SIGMA_M
-            and self.length > SIGMAS * sigma
+        return self.is_confirmed or (
+            self.is_likely
+            and self.squares >= LEAST_SQUARES
+            and self.footprints >= LEAST_FOOTPRINTS
             and self.agreement > LEAST_AGREEMENT
         )
+
+    @property
+    def is_likely(self) -> bool:
+        """Whether the footprints used lie beside their roofs, however few they are."""
+        sigma = max(self.sigma)
+        return sigma <= MOST_SIGMA_M and self.length >= max(SMALLEST_SHIFT_M, SIGMAS * sigma)
 
     @property
     def shift(self) -> tuple[float, float]:

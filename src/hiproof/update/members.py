@@ -195,8 +195,8 @@ def make_members(
     """Return the buildings of an update.
 
     Without new footprints they are the earlier ones. With them these come first, and then what
-    they replace nothing of. New footprints are registered to the new roofs: how far the earlier
-    ones were moved says nothing of them.
+    they replace nothing of. New footprints are registered to the new roofs, and where these are few
+    also to the earlier outlines: how far those were moved says nothing of them.
     """
     kept = [keep_member(record) for record in earlier.records]
     if not request.footprints:
@@ -205,12 +205,18 @@ def make_members(
     footprints = leave_out_copies(footprints, request.footprints)
     bounds = frame.units.to_metres(plan_bounds(headers).reshape(-1, 2)).reshape(-1, 4)
     check_overlap(footprints, bounds.tolist(), frame.footprints, frame.cloud, frame.units)
+    old = [member.outline for member in kept]
     registration = register_footprints(
-        footprints, headers, frame.units, settings, request.footprints
+        footprints,
+        headers,
+        frame.units,
+        settings,
+        request.footprints,
+        functools.partial(is_known_shift, old, footprints),
     )
     shift = registration.shift if registration else (0.0, 0.0)
-    drawn = [shapely.transform(f.polygon, lambda xy: xy + shift) for f in footprints]
-    successors = match_outlines([member.outline for member in kept], drawn)
+    drawn = move_outlines(footprints, shift)
+    successors = match_outlines(old, drawn)
     successors = [
         dataclasses.replace(s, is_same_outline=s.is_same_outline or is_known(kept, s, footprint))
         for s, footprint in zip(successors, footprints, strict=True)
@@ -230,6 +236,21 @@ def make_members(
         result.append(dataclasses.replace(member, ended=tuple(filter(None, ended))))
         names.add(member.id)
     return (*result, *others)
+
+
+def move_outlines(
+    footprints: tuple[Footprint, ...], shift: tuple[float, float]
+) -> list[shapely.Polygon]:
+    return [shapely.transform(f.polygon, lambda xy: xy + shift) for f in footprints]
+
+
+def is_known_shift(
+    old: list[shapely.Polygon], footprints: tuple[Footprint, ...], shift: tuple[float, float]
+) -> bool:
+    """Return whether footprints lie on `old` outlines, those of roofs, once they are moved."""
+    still, moved = (match_outlines(old, move_outlines(footprints, s)) for s in ((0.0, 0.0), shift))
+    n_still, n_moved = (sum(s.is_same_outline for s in found) for found in (still, moved))
+    return n_moved > max(2 * n_still, sum(s.earlier >= 0 for s in moved) // 2)
 
 
 def warn_of_other_ids(

@@ -12,7 +12,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from itertools import product
 
 import numpy as np
@@ -55,6 +55,7 @@ CELL_MARGIN_M = FARTHEST_SHIFT_M + 1.0
 """How far (m) around a square footprints bear on its points."""
 
 Cell = tuple[int, int]
+Point = tuple[float, float]
 
 
 def register_footprints(
@@ -63,14 +64,18 @@ def register_footprints(
     units: Units,
     settings: Settings,
     path: str,
+    is_known: Callable[[Point], bool] = lambda _: False,
 ) -> Registration | None:
     """Estimate the common shift of footprints; warn where it is clear.
 
     `path` is that of their file. None where it is not looked for: it is where classes mark roofs.
+    `is_known` says whether something other than roofs shows a shift (m), which then few may show.
     """
     if settings.reconstruct.align == "off" or not settings.read.by_class:
         return None
     registration = find_registration(footprints, headers, units, settings)
+    if registration.is_likely and is_known(registration.xy):
+        registration = dataclasses.replace(registration, is_confirmed=True)
     warn_if_moved(registration, path)
     return registration
 
