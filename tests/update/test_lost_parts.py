@@ -82,6 +82,23 @@ def stand_on_slope(town, slope):
     return town
 
 
+@pytest.mark.parametrize("gap", [1.0, 2.0, 2.5])
+def test_lines_of_a_scan_far_apart_show_what_lies_between_them(run, gap, tmp_path):
+    """Sixty points a metre of line, 6 cm wide: cells between the lines are empty."""
+    town = make_town(seed=7, density=60.0)
+    areas = {id: lay_bare(town, id, kept) for id, kept in KEPT.items()}
+    on_line = (town.xyz[:, 1] - ORIGIN[1]) % gap < 0.06
+    town = dataclasses.replace(
+        town, xyz=town.xyz[on_line], classification=town.classification[on_line]
+    )
+    after = update(run, tmp_path / "out", town)
+    assert take_kind(after["house-1"]) == "unchanged"
+    for id, area in areas.items():
+        place = after[id]["change"]["places"][0]
+        assert place["kind"] == "part_removed"
+        assert 0.6 * area < place["area"] < 1.1 * area
+
+
 @pytest.mark.parametrize("slope", [(0.15, 0.0), (-0.1, 0.12), (0.2, 0.15)])
 def test_what_lies_bare_on_a_slope_is_lost(slope, tmp_path):
     """The ground under a house is higher than its lowest place by more than a metre."""

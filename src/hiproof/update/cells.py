@@ -26,6 +26,8 @@ POINTS_A_CELL."""
 
 POINTS_A_CELL = 1.5  # by chance 1 - exp(-1.5) = 78 % of the cells then hold points
 
+LEAST_FILLED = 0.7  # share of the cells that hold points; lines far apart leave more of them empty
+
 FEWEST_OCCUPIED = 0.1  # share of the cells that hold points in the sparsest survey
 
 INSIDE_M = 0.4
@@ -174,17 +176,23 @@ def choose_cell(inner: shapely.Geometry, *surveys: np.ndarray) -> float:
     """Return the side (m) of the cells for the points (n, 3) of surveys.
 
     Points lie inside `inner`. It follows from the density of the sparsest survey, where that has
-    points.
+    points, and from how far lines of points lie apart.
     """
     wide = CELL_SIDES_M[-1]
     all_cells = [number_cells(np.floor(xyz[:, :2] / wide))[0] for xyz in surveys]
     count = count_cells(np.concatenate(all_cells))
     area = min(wide**2, inner.area / max(count, 1))  # that is inside, of a cell
-    density = min(
-        len(xyz) / max(len(cells) * area, 1e-9)
-        for xyz, cells in zip(surveys, all_cells, strict=True)
-    )
-    return next((side for side in CELL_SIDES_M if density * side**2 >= POINTS_A_CELL), wide)
+    areas = [max(len(cells) * area, 1e-9) for cells in all_cells]
+
+    def is_filled(xyz: np.ndarray, area_m2: float, side: float) -> bool:
+        return len(xyz) * side**2 >= POINTS_A_CELL * area_m2 and (
+            count_cells(np.floor(xyz[:, :2] / side)) * side**2 >= LEAST_FILLED * area_m2
+        )
+
+    for side in CELL_SIDES_M[:-1]:
+        if all(is_filled(*survey, side) for survey in zip(surveys, areas, strict=True)):
+            return side
+    return wide
 
 
 def predict_occupancy(counts: np.ndarray) -> float:
