@@ -7,7 +7,6 @@ readable          whether a file of parameters can hold a roof
 solid             `compose`: the steps below, one after the other; terrain intersection
 cells             outline, pieces and the lines where the active plane changes as one plan of cells
 arrangement       the planar arrangement under them, on an integer grid
-buckets           what lies near a place, for it
 levels            which heights meet over every vertex of the plan
 shell             roof, wall and ground faces that share them
 check             whether the result is valid by ISO 19107

@@ -16,10 +16,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..compiled import compiled
-from ..geometry.arrays import copy_row, sort_values
+from ..geometry.arrays import copy_row, copy_rows, sort_values
 from ..geometry.components import label_components
 from ..geometry.point_in_polygon import flips
-from .buckets import append_row, enter_edge, enter_item, grow_array, lay_buckets, list_near
 
 GRID_M = 1e-4  # m; how CityJSON is rounded, so that what is checked is what is written
 OUTSIDE, UNCOVERED = -1, -2  # labels of faces that no plane covers
@@ -28,14 +27,31 @@ COLLINEAR_UNITS = 5.0
 
 
 @compiled
-def find_vertex_at(xy, items, x, y, reach):
-    """Return the vertex of `items` nearest to (x, y) within `reach`, else -1."""
+def grow_array(array):
+    """Return a copy of `array` with twice the rows."""
+    larger = np.empty((2 * len(array), array.shape[1]), array.dtype)
+    copy_rows(larger, array)
+    return larger
+
+
+@compiled
+def append_row(rows, count, a, b):
+    """Append (a, b) to `rows`, of which `count` are used, or a copy; returns rows and count."""
+    if count == len(rows):
+        rows = grow_array(rows)
+    rows[count, 0], rows[count, 1] = a, b
+    return rows, count + 1
+
+
+@compiled
+def find_vertex_at(xy, x, y, reach):
+    """Return the vertex of `xy` (n, 2) nearest to (x, y) within `reach`, else -1."""
     best, best_d2 = -1, reach * reach
-    for v in items:
+    for v in range(len(xy)):
         dx, dy = xy[v, 0] - x, xy[v, 1] - y
         if abs(dx) < reach and abs(dy) < reach:
             d2 = float(dx * dx + dy * dy)
-            if d2 < best_d2 or (d2 == best_d2 and v < best):
+            if d2 < best_d2:
                 best, best_d2 = v, d2
     return best
 
@@ -52,8 +68,8 @@ def is_beside(p, a, b, reach):
 
 
 @compiled
-def find_vertex_near_segment(xy, items, a, b, reach):
-    """Return the vertex of `items` beside segment ab nearest to a, else -1.
+def find_vertex_near_segment(xy, a, b, reach):
+    """Return the vertex of `xy` (n, 2) beside segment ab nearest to a, else -1.
 
     The segment's ends do not count. Nor does a vertex that makes a small triangle with them, in
     which an end lies beside the edge from the vertex to the other end: its three edges would
@@ -62,14 +78,14 @@ def find_vertex_near_segment(xy, items, a, b, reach):
     x_low, x_high = min(xy[a, 0], xy[b, 0]) - reach, max(xy[a, 0], xy[b, 0]) + reach
     y_low, y_high = min(xy[a, 1], xy[b, 1]) - reach, max(xy[a, 1], xy[b, 1]) + reach
     best, best_along = -1, np.int64(0)
-    for v in items:
+    for v in range(len(xy)):
         x, y = xy[v, 0], xy[v, 1]
         if x < x_low or x > x_high or y < y_low or y > y_high or v in (a, b):
             continue
         if not is_beside(xy[v], xy[a], xy[b], reach):
             continue
         along = (xy[b, 0] - xy[a, 0]) * (x - xy[a, 0]) + (xy[b, 1] - xy[a, 1]) * (y - xy[a, 1])
-        if best >= 0 and (along > best_along or (along == best_along and v >= best)):
+        if best >= 0 and along >= best_along:
             continue
         if is_beside(xy[a], xy[v], xy[b], reach) or is_beside(xy[b], xy[a], xy[v], reach):
             continue
@@ -84,14 +100,13 @@ def turn(a, b, c):
 
 
 @compiled
-def find_first_crossing(xy, edges, items, a, b):
-    """Return the first live edge of `items` that properly crosses segment ab, else -1."""
+def find_first_crossing(xy, edges, a, b):
+    """Return the first live edge that properly crosses segment ab, else -1."""
     x_low, x_high = min(xy[a, 0], xy[b, 0]), max(xy[a, 0], xy[b, 0])
     y_low, y_high = min(xy[a, 1], xy[b, 1]), max(xy[a, 1], xy[b, 1])
-    first = -1
-    for e in items:
+    for e in range(len(edges)):
         c, d = edges[e, 0], edges[e, 1]
-        if c < 0 or 0 <= first <= e or c in (a, b) or d in (a, b):
+        if c < 0 or c in (a, b) or d in (a, b):
             continue
         if max(xy[c, 0], xy[d, 0]) < x_low or min(xy[c, 0], xy[d, 0]) > x_high:
             continue
@@ -102,8 +117,8 @@ def find_first_crossing(xy, edges, items, a, b):
             continue
         left, right = turn(xy[c], xy[d], xy[a]), turn(xy[c], xy[d], xy[b])
         if (left > 0) != (right > 0) and left != 0 and right != 0:
-            first = e
-    return first
+            return e
+    return -1
 
 
 @compiled
@@ -116,29 +131,24 @@ def crossing_point(a, b, c, d):
 
 @compiled
 def number_ends(segments, reach):
-    """Number the segments' end points: xy with room, their number, ends (m, 2), buckets."""
-    size, r = len(segments), np.int64(reach) + 1
-    xy, count = np.empty((2 * size + 16, 2), np.int64), 0
-    ends, items = np.empty((size, 2), np.int64), np.empty(0, np.int64)
-    buckets = lay_buckets(segments.reshape(-1, 2), size)
-    for s in range(size):
+    """Number the segments' end points: xy with room, their number, and ends (m, 2)."""
+    xy, count = np.empty((2 * len(segments) + 16, 2), np.int64), 0
+    ends = np.empty((len(segments), 2), np.int64)
+    for s in range(len(segments)):
         for end in range(2):
             x, y = segments[s, 2 * end], segments[s, 2 * end + 1]
-            items, n_items = list_near(x - r, y - r, x + r, y + r, buckets, items)
-            v = find_vertex_at(xy, items[:n_items], x, y, reach)
+            v = find_vertex_at(xy[:count], x, y, reach)
             if v < 0:
                 v, xy[count, 0], xy[count, 1] = count, x, y
-                buckets = enter_item(v, x, y, x, y, buckets)
                 count += 1
             ends[s, end] = v
-    return xy, count, ends, buckets
+    return xy, count, ends
 
 
 @compiled
-def has_edge(edges, items, a, b):
-    """Return whether edge ab, in either direction, is one of `items`."""
-    for e in items:
-        c, d = edges[e, 0], edges[e, 1]
+def has_edge(edges, a, b):
+    """Return whether edge ab, in either direction, is one of `edges` (e, 2)."""
+    for c, d in edges:
         if (c == a and d == b) or (c == b and d == a):
             return True
     return False
@@ -153,11 +163,9 @@ def node(segments, reach):
     edges if it does not come to rest (never seen; the bound keeps a broken input from hanging a
     run).
     """
-    r = np.int64(reach) + 1
-    xy, count, ends, places = number_ends(segments, reach)
+    xy, count, ends = number_ends(segments, reach)
     stack, top = ends[::-1].copy(), len(ends)  # the first on top
     edges, edge_count = np.empty((2 * len(segments) + 16, 2), np.int64), 0
-    borders, items = lay_buckets(xy[:count], len(segments)), np.empty(0, np.int64)
     steps = 0
     while top > 0:
         steps += 1
@@ -169,28 +177,21 @@ def node(segments, reach):
             continue
         while top + 1 + edge_count > len(stack):  # what may be taken back, and the segment itself
             stack = grow_array(stack)
-        x_low, x_high = min(xy[a, 0], xy[b, 0]), max(xy[a, 0], xy[b, 0])
-        y_low, y_high = min(xy[a, 1], xy[b, 1]), max(xy[a, 1], xy[b, 1])
-        items, n_items = list_near(x_low - r, y_low - r, x_high + r, y_high + r, places, items)
-        v = find_vertex_near_segment(xy, items[:n_items], a, b, reach)
+        v = find_vertex_near_segment(xy[:count], a, b, reach)
         if v >= 0:
             stack, top = append_row(stack, top, v, b)
             stack, top = append_row(stack, top, a, v)
             continue
-        items, n_items = list_near(x_low, y_low, x_high, y_high, borders, items)
-        if has_edge(edges, items[:n_items], a, b):
+        if has_edge(edges[:edge_count], a, b):
             continue
-        e = find_first_crossing(xy, edges, items[:n_items], a, b)
+        e = find_first_crossing(xy, edges[:edge_count], a, b)
         if e < 0:
             edges, edge_count = append_row(edges, edge_count, a, b)
-            borders = enter_edge(edge_count - 1, xy, edges, borders)
             continue
         x, y = crossing_point(xy[a], xy[b], xy[edges[e, 0]], xy[edges[e, 1]])
         xy, count = append_row(xy, count, x, y)
-        places = enter_item(count - 1, x, y, x, y, places)
         stack, top = append_row(stack, top, a, b)
-        items, n_items = list_near(x - r, y - r, x + r, y + r, borders, items)
-        top = take_back(xy, count - 1, e, edges, items[:n_items], stack, top, reach)
+        top = take_back(xy, count - 1, e, edges[:edge_count], stack, top, reach)
     live = 0
     for e in range(edge_count):
         if edges[e, 0] >= 0:
@@ -200,17 +201,12 @@ def node(segments, reach):
 
 
 @compiled
-def take_back(xy, vertex, crossed, edges, items, stack, top, reach):
-    """Put edges of `items` back on the stack that must go through a new vertex.
+def take_back(xy, vertex, crossed, edges, stack, top, reach):
+    """Put `edges` (e, 2) back on the stack that must go through a new vertex.
 
-    These are the `crossed` edge and those beside `vertex`, in their order. Returns the stack's new
-    top.
+    These are the `crossed` edge and those beside `vertex`. Returns the stack's new top.
     """
-    for i in range(len(items)):
-        for j in range(i, 0, -1):  # in order, for there are few
-            if items[j - 1] > items[j]:
-                items[j - 1], items[j] = items[j], items[j - 1]
-    for e in items:
+    for e in range(len(edges)):
         c = edges[e, 0]
         if c >= 0 and (e == crossed or is_beside(xy[vertex], xy[c], xy[edges[e, 1]], reach)):
             copy_row(stack[top], edges[e])
