@@ -20,7 +20,7 @@ from hiproof.update.judge import judge_building
 from hiproof.update.kinds import name_differences
 from hiproof.update.register import SampledRoof, register_surveys
 
-NOISE, GROUND = SurveyNoise(), Ground(0.0)
+NOISE, GROUND = SurveyNoise(), Ground(np.zeros(3), 0.0, 0.0)
 FLAT = {"length": 16.0, "width": 10.0}
 GABLE = {"length": 14.0, "width": 9.0, "height": 3.5}
 
@@ -95,7 +95,7 @@ def test_every_kind_of_change_is_found_and_most_are_named(kind):
             new = np.concatenate([new, yard[bare]])
         verdict = judge((before.roof, scan(rng, before.roof)), new)
         assert verdict.change is Change.CHANGED
-        found = name_differences(verdict, before.roof, after.roof, GROUND, 0.01)
+        found = name_differences(verdict, before.roof, after.roof, 0.01)
         named.append(found[0].kind.code)
     assert named.count(kind) >= 5, named
 
@@ -111,7 +111,7 @@ def test_an_added_storey_is_measured_within_two_centimetres(rng):
     roof = make_roof()
     new = scan(rng, roof.roof) + (0.0, 0.0, 2.8)
     verdict = judge((roof.roof, scan(rng, roof.roof)), new)
-    (place,) = name_differences(verdict, roof.roof, None, GROUND, 0.01)
+    (place,) = name_differences(verdict, roof.roof, None, 0.01)
     assert place.kind is ChangeKind.ROOF_RAISED
     assert place.difference_m == pytest.approx(2.8, abs=0.02)
     assert place.sigma_m < 0.03

@@ -98,9 +98,9 @@ class TileSurveys:
         )
         steps = [self.shifts[survey] for survey in (name, other) if survey in self.shifts]
         shift = max(steps, key=lambda step: step.noise.roof, default=SurveyShift())
-        verdict = judge_building(
-            roof, old, new, Ground.under(building), shift.noise, shift.sigma[2], SIGNIFICANCE
-        )
+        ground = Ground.under(building, roof.frame)
+        noise, sigma_m = shift.noise, shift.sigma[2]
+        verdict = judge_building(roof, old, new, ground, noise, sigma_m, SIGNIFICANCE)
         return verdict.change is Change.UNCHANGED
 
 

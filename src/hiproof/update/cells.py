@@ -137,25 +137,30 @@ def compare_points(
 
     Without old points the earlier roof itself stands for them.
     """
-    inner = shrink_outline(roof.outline)
-    new, r_new = select_inner(roof, inner, new)
-    if old is None:
-        return compare_with_roof(new, r_new, noise, choose_cell(inner, new), roof.outline.area)
-    old, r_old = select_inner(roof, inner, old)
-    cell_m = choose_cell(inner, old, new)
-    both = np.floor(np.concatenate([old[:, :2], new[:, :2]]) / cell_m)
-    cells, number = number_cells(both)
-    in_old, in_new = number[: len(old)], number[len(old) :]
-    m_old, s_old, n_old = summarise_cells(in_old, r_old, len(cells), noise.point)
+    inner, outline_m2 = shrink_outline(roof.outline), roof.outline.area
+    surveys = [select_inner(roof, inner, xyz) for xyz in (old, new) if xyz is not None]
+    new, r_new = surveys[-1]
+    cell_m = choose_cell(inner, *(xyz for xyz, _ in surveys))
+    cells, number = number_cells(
+        np.floor(np.concatenate([xyz[:, :2] for xyz, _ in surveys]) / cell_m)
+    )
+    in_old, in_new = np.split(number, [len(number) - len(new)])
     m_new, s_new, n_new = summarise_cells(in_new, r_new, len(cells), noise.point)
-    s_new = np.fmin(s_new, np.fmax(s_old, 2 * noise.point))  # as an unchanged roof would scatter
+    if old is None:
+        r_old, n_old, (m_old, v_old) = r_new[:0], np.ones_like(n_new), np.zeros((2, len(cells)))
+        outline_m2 = min(outline_m2, len(cells) * cell_m**2)
+    else:
+        r_old = surveys[0][1]
+        m_old, s_old, n_old = summarise_cells(in_old, r_old, len(cells), noise.point)
+        s_new = np.fmin(s_new, np.fmax(s_old, 2 * noise.point))  # as an unchanged roof scatters
+        v_old = s_old**2
     with np.errstate(divide="ignore", invalid="ignore"):
-        sampling = MEDIAN_VARIANCE * (s_old**2 / n_old + s_new**2 / n_new)
+        sampling = MEDIAN_VARIANCE * (v_old / n_old + s_new**2 / n_new)
     sigma = np.sqrt(np.where(np.isfinite(sampling), sampling, np.inf) + noise.variance)
     near = SAME_SIGMAS * np.hypot(noise.point, noise.cell)
     return CellComparison(
         cell_m,
-        roof.outline.area,
+        outline_m2,
         cells,
         m_old,
         m_new,
@@ -209,39 +214,6 @@ def predict_occupancy(counts: np.ndarray) -> float:
     return max(-math.expm1(-m), FEWEST_OCCUPIED)
 
 
-def compare_with_roof(
-    new: np.ndarray, residuals: np.ndarray, noise: SurveyNoise, cell_m: float, area_m2: float
-) -> CellComparison:
-    """Compare new points (n, 3) with the roof over which they have `residuals` (n,).
-
-    The roof covers `area_m2`.
-    """
-    cells, number = number_cells(np.floor(new[:, :2] / cell_m))
-    median, scatter, count = summarise_cells(number, residuals, len(cells), noise.point)
-    zero = np.zeros(len(cells))
-    sigma = np.sqrt(MEDIAN_VARIANCE * scatter**2 / np.maximum(count, 1) + noise.variance)
-    near = SAME_SIGMAS * np.hypot(noise.point, noise.cell)
-    kept = compute_share_near(number, residuals, zero, near)
-    none = np.zeros(0, np.int64), np.zeros(0)
-    one = np.ones_like(count)
-    return CellComparison(
-        cell_m,
-        min(area_m2, len(cells) * cell_m**2),
-        cells,
-        zero,
-        median,
-        one,
-        count,
-        sigma,
-        kept,
-        zero,
-        new,
-        number,
-        residuals,
-        *none,
-    )
-
-
 def select_inner(
     roof: Roof, inner: shapely.Geometry, points: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -260,38 +232,15 @@ def summarise_cells(
 
     The scatter is 1.48 times the median deviation, and at least `least`. Empty cells have NaN.
     """
-    number, values = sort_in_cells(number, values, count)
+    from scipy.ndimage import median
+
     n = np.bincount(number, minlength=count)
-    start = np.concatenate([[0], np.cumsum(n)])[:-1]
-    median = take_middle(values, start, n)
-    deviation = sort_in_cells(number, np.abs(values - median[number]), count)[1]
-    scatter = np.maximum(1.4826 * take_middle(deviation, start, n), least)
-    return median, scatter, n
-
-
-def sort_in_cells(
-    number: np.ndarray, values: np.ndarray, count: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return cells (n,) in order, and their values (n,), ascending in each cell.
-
-    It is a lexsort; NumPy counts rather than compares the few cells of a building.
-    """
-    order = np.argsort(values)
-    cells = number[order].astype(np.min_scalar_type(count))
-    order = order[np.argsort(cells, kind="stable")]
-    return number[order], values[order]
-
-
-def take_middle(values: np.ndarray, start: np.ndarray, n: np.ndarray) -> np.ndarray:
-    """Return the median (k,) of runs of sorted values.
-
-    A run begins at `start` (k,) and has `n` (k,) values; without any the median is NaN.
-    """
-    result = np.full(len(n), np.nan)
-    has = n > 0
-    lower, upper = start[has] + (n[has] - 1) // 2, start[has] + n[has] // 2
-    result[has] = (values[lower] + values[upper]) / 2
-    return result
+    occupied, middle, scatter = np.flatnonzero(n), *np.full((2, count), np.nan)
+    if len(occupied):
+        middle[occupied] = median(values, number, occupied)
+        deviation = np.abs(values - middle[number])
+        scatter[occupied] = np.maximum(1.4826 * median(deviation, number, occupied), least)
+    return middle, scatter, n
 
 
 def compute_share_near(

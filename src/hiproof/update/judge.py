@@ -44,17 +44,15 @@ DOUBTFUL_M2 = 4.0
 class ChangeVerdict:
     """The class of a building, and what it rests on.
 
-    `chance` bounds the probability that an unchanged building looks like this. `clusters` are those
-    that count; `whole_m` is how much higher the roof as a whole lies (0 where it does not), with
-    `whole_sigma_m`. `comparison` is None where nothing was compared.
+    These are the `comparison` of both surveys and the earlier `ground`. `chance` bounds the
+    probability that an unchanged building looks like this. `clusters` are those that count.
     """
 
     change: Change
+    comparison: CellComparison
+    ground: Ground
     chance: float = 1.0
     clusters: tuple[ChangedCells, ...] = ()
-    whole_m: float = 0.0
-    whole_sigma_m: float = math.nan
-    comparison: CellComparison | None = None
 
 
 def judge_building(
@@ -75,10 +73,9 @@ def judge_building(
     """
     comparison = compare_points(roof, old, new, noise)
     if is_not_covered(comparison, roof):
-        return ChangeVerdict(Change.NOT_COVERED, comparison=comparison)
+        return ChangeVerdict(Change.NOT_COVERED, comparison, ground)
     if is_gone(comparison, roof, ground):
-        return ChangeVerdict(Change.GONE, 0.0, comparison=comparison)
-    whole, sigma, chance_whole = measure_whole(comparison, noise, sigma_m)
+        return ChangeVerdict(Change.GONE, comparison, ground, 0.0)
     found = [c for c in find_clusters(comparison, noise.stray) if c.area_m2 >= SMALLEST_M2]
     likely = [c for c in found if c.chance < significance]
     beyond = unexplained_m2 if old is None else 0.0
@@ -87,17 +84,13 @@ def judge_building(
         for c in likely
         if (c.is_surface or lies_bare(c, comparison, ground)) and c.area_m2 > beyond
     )
-    chance = min([1.0, *(c.chance for c in clear)])
-    if chance_whole < significance:
-        return ChangeVerdict(
-            Change.CHANGED, min(chance, chance_whole), clear, whole, sigma, comparison
-        )
-    if clear:
-        return ChangeVerdict(Change.CHANGED, chance, clear, comparison=comparison)
+    chance = min([compute_whole_chance(comparison, noise, sigma_m), *(c.chance for c in clear)])
+    if clear or chance < significance:
+        return ChangeVerdict(Change.CHANGED, comparison, ground, chance, clear)
     doubtful = tuple(c for c in likely if c.area_m2 >= DOUBTFUL_M2)
     if doubtful:
-        return ChangeVerdict(Change.UNCERTAIN, doubtful[0].chance, doubtful, comparison=comparison)
-    return ChangeVerdict(Change.UNCHANGED, comparison=comparison)
+        return ChangeVerdict(Change.UNCERTAIN, comparison, ground, doubtful[0].chance, doubtful)
+    return ChangeVerdict(Change.UNCHANGED, comparison, ground)
 
 
 def is_not_covered(comparison: CellComparison, roof: Roof) -> bool:
@@ -109,7 +102,7 @@ def is_not_covered(comparison: CellComparison, roof: Roof) -> bool:
     compared, earlier = int(c.is_compared.sum()), int((c.n_old > 0).sum())
     if compared < FEWEST_COMPARED:
         return True
-    without_old = (c.old == 0).all() and (c.known == 0).all()
+    without_old = not len(c.number_old)
     share = compared * c.cell_m**2 / roof.outline.area if without_old else compared / earlier
     share /= predict_occupancy(c.n_new)
     return bool(share < (COVERED / 2 if without_old else COVERED))
@@ -118,11 +111,8 @@ def is_not_covered(comparison: CellComparison, roof: Roof) -> bool:
 def is_gone(comparison: CellComparison, roof: Roof, ground: Ground) -> bool:
     """Return whether bare ground lies where the roof was."""
     c = comparison
-    chosen = c.is_compared
-    if (c.new < c.old - OVER_GROUND_M).sum() < FEWEST_COMPARED:
-        return False  # hardly a building is: its heights need not be looked up
     heights = find_heights(roof, c) - ground.height_at(c.centres)
-    was_roof = chosen & (heights + c.old > 2 * OVER_GROUND_M)
+    was_roof = c.is_compared & (heights + c.old > 2 * OVER_GROUND_M)
     on_ground = was_roof & (heights + c.new < OVER_GROUND_M)
     return int(on_ground.sum()) >= max(FEWEST_COMPARED, GONE_SHARE * int(was_roof.sum()))
 
@@ -143,17 +133,13 @@ def find_heights(roof: Roof, comparison: CellComparison) -> np.ndarray:
     return np.where(np.isfinite(heights), heights, lowest)
 
 
-def measure_whole(
-    comparison: CellComparison, noise: SurveyNoise, sigma_m: float
-) -> tuple[float, float, float]:
-    """Return how much higher the whole roof lies, its sigma, and the chance of that.
+def compute_whole_chance(comparison: CellComparison, noise: SurveyNoise, sigma_m: float) -> float:
+    """Return the chance that the whole roof lies higher or lower by so much.
 
-    The difference counts where most cells take part in it.
+    It is 1 where not most cells take part in that.
     """
     d, s = (v[comparison.is_compared] for v in (comparison.difference, comparison.sigma))
     middle = float(np.median(d))
     sigma = math.sqrt(noise.roof**2 + sigma_m**2 + 1.57 * float(np.mean(s**2)) / len(d))
     together = np.mean(np.abs(d - middle) < np.abs(d))
-    if together < WHOLE_SHARE:
-        return middle, sigma, 1.0
-    return middle, sigma, math.erfc(abs(middle) / sigma / math.sqrt(2))
+    return 1.0 if together < WHOLE_SHARE else math.erfc(abs(middle) / sigma / math.sqrt(2))

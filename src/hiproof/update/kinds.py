@@ -16,7 +16,6 @@ from ..model import Roof
 from ..status import ChangeKind
 from .cells import MEDIAN_VARIANCE, CellComparison
 from .clusters import ChangedCells
-from .ground import Ground
 from .judge import OVER_GROUND_M, ChangeVerdict, find_heights
 from .lineage import show_parts
 
@@ -92,18 +91,16 @@ class BeforeAfter:
 
 
 def name_differences(
-    verdict: ChangeVerdict, before: Roof, after: Roof | None, ground: Ground, sigma_m: float
+    verdict: ChangeVerdict, before: Roof, after: Roof | None, sigma_m: float
 ) -> list[Difference]:
     """Name what changed of a building, the largest place first.
 
     `after` is the new roof in the frame of the one `before`, None where no new roof explains the
-    points. `ground` is the earlier one in that frame.
+    points.
     """
     c = verdict.comparison
-    if c is None:
-        return []
     with np.errstate(invalid="ignore"):
-        height = find_heights(before, c) + c.new - ground.height_at(c.centres)
+        height = find_heights(before, c) + c.new - verdict.ground.height_at(c.centres)
         on_ground = height < OVER_GROUND_M
     shown = show_parts(before, c.centres)
     shown_after = np.full(len(shown), -1) if after is None else show_parts(after, c.centres)
@@ -121,8 +118,6 @@ def name_differences(
 def name_doubts(verdict: ChangeVerdict) -> list[Difference]:
     """Return the places that make a building uncertain."""
     c = verdict.comparison
-    if c is None:
-        return []
     return [
         Difference(
             ChangeKind.UNCLEAR,

@@ -25,7 +25,6 @@ from ..stages.remarks import add_finding
 from ..status import Change, Doubt, Status
 from .cells import MEDIAN_VARIANCE, CellComparison
 from .epochs import Surveys
-from .ground import Ground
 from .judge import FEWEST_COMPARED, OVER_GROUND_M, ChangeVerdict, judge_building, lies_bare
 from .lineage import lift_part, measure_lift, show_parts, unite_lifts
 from .places import move_to_frame
@@ -48,7 +47,7 @@ def move_building(
     `near_m`.
     """
     roof, comparison = earlier.roof, verdict.comparison
-    if comparison is None or earlier.status is not Status.MODELLED or record.get("installations"):
+    if earlier.status is not Status.MODELLED or record.get("installations"):
         return None
     lifts = measure_lifts(roof, comparison, near_m)
     if lifts is None or not any(lifts):
@@ -68,7 +67,7 @@ def move_building(
         result.roof,
         old,
         points[1],
-        Ground.under(earlier),
+        verdict.ground,
         surveys.shift.noise,
         surveys.shift.sigma[2],
         surveys.largest_chance,
@@ -142,14 +141,12 @@ class LostParts:
     earlier: Roof
 
     @classmethod
-    def find(cls, verdict: ChangeVerdict, earlier: Roof, ground: Ground) -> LostParts | None:
+    def find(cls, verdict: ChangeVerdict, earlier: Roof) -> LostParts | None:
         """Find the places that a verdict calls changed and where the ground lies bare.
 
-        `ground` is the earlier one in the frame of the roof. None where there are none.
+        None where there are none.
         """
-        c = verdict.comparison
-        if c is None:
-            return None
+        c, ground = verdict.comparison, verdict.ground
         bare = [cluster for cluster in verdict.clusters if lies_bare(cluster, c, ground)]
         if not bare:
             return None

@@ -77,11 +77,7 @@ class SurveyCells:
             is_kind = np.zeros(256, bool)
             is_kind[list(classes)] = True
             points = cloud.xyz.compress(is_kind[cloud.classes], axis=0)
-            if not len(points):
-                continue
-            if kind == "ground" and self.has_classes:
-                self.found[kind].append(find_places(points))
-            else:
+            if len(points):
                 squared = np.column_stack([points, points[:, 2] ** 2])
                 self.found[kind].append(average_cells(squared))
 
@@ -113,19 +109,6 @@ def average_cells(
     weights = columns if counts is None else (counts * values for values in columns)
     sums = [np.bincount(number, weights=values) for values in weights]
     return np.column_stack(sums) / total[:, None] + offset, total.astype(float)
-
-
-def find_places(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the middles (k, 4) of cells that hold points (n, 3), at the mean height of these.
-
-    Also returns the number of points (k,) of each.
-    """
-    occupied, number = number_cells(find_cells(points))
-    counts = np.bincount(number).astype(float)
-    places = np.zeros((len(occupied), 4))
-    places[:, :2] = occupied + 0.5
-    places[:, 2] = np.bincount(number, weights=points[:, 2]) / counts
-    return places, counts
 
 
 def find_cells(points: np.ndarray) -> np.ndarray:
@@ -323,10 +306,8 @@ def measure_height(points: np.ndarray, ground: np.ndarray) -> float | None:
     `points` (k, 3) and `ground` (m, 3) are cells; the result is None where no ground is near.
     """
     low, high = (f(points[:, :2], axis=0) for f in (np.min, np.max))
-    x, y = ground[:, :2].T
-    inside = (x >= low[0] - GROUND_AROUND_M) & (x <= high[0] + GROUND_AROUND_M)
-    inside &= (y >= low[1] - GROUND_AROUND_M) & (y <= high[1] + GROUND_AROUND_M)
-    heights = ground[inside, 2]
+    off = np.maximum(low - ground[:, :2], ground[:, :2] - high).max(axis=1)
+    heights = ground[off <= GROUND_AROUND_M, 2]
     return float(np.median(points[:, 2]) - np.median(heights)) if len(heights) else None
 
 
@@ -368,16 +349,7 @@ def is_beside(points: np.ndarray, others: np.ndarray) -> np.ndarray:
 
 def is_among(cells: np.ndarray, others: np.ndarray) -> np.ndarray:
     """Return whether (k,) `cells` (k, 2) are among `others` (m, 2)."""
-    result = np.zeros(len(cells), bool)
-    if not len(others):
-        return result
-    low = others.min(axis=0)
-    table = np.zeros(np.ptp(others, axis=0) + 1, bool)
-    table[tuple((others - low).T)] = True
-    column, row = (cells - low).T
-    inside = (column >= 0) & (row >= 0) & (column < table.shape[0]) & (row < table.shape[1])
-    result[inside] = table[column[inside], row[inside]]
-    return result
+    return np.isin(cells @ KEY_OF_CELL, others @ KEY_OF_CELL)
 
 
 def draw_places(points: np.ndarray) -> shapely.Geometry:

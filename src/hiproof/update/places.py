@@ -34,18 +34,15 @@ NEAR_M, WELL_SHARE = 0.2, 0.6
 new roof has to explain: of usual roofs nine in ten are."""
 
 
-def explains(new: Roof, old: Roof, verdict: ChangeVerdict, ground: Ground) -> bool:
+def explains(new: Roof, old: Roof, verdict: ChangeVerdict) -> bool:
     """Return whether the new roof explains the new points better, and well.
 
-    It has to explain points that contradict the earlier one. Both roofs and the `ground`
-    are in one frame.
+    It has to explain points that contradict the earlier one. Both roofs are in one frame.
     """
     c = verdict.comparison
-    if c is None:
-        return False
     members = [cluster.members for cluster in verdict.clusters]
     chosen = np.isin(c.number, np.concatenate(members)) if members else c.number >= 0
-    is_near = [measure_distances(roof, c.points, ground) <= NEAR_M for roof in (new, old)]
+    is_near = [measure_distances(roof, c.points, verdict.ground) <= NEAR_M for roof in (new, old)]
     share, share_before = (float(np.mean(near[chosen])) for near in is_near)
     return share >= max(BETTER_SHARE, share_before) and float(np.mean(is_near[0])) >= WELL_SHARE
 

@@ -31,7 +31,7 @@ from ..city.work.solve import (
 from ..model import Building, Roof
 from ..parametric.building import build, with_model
 from ..parametric.override import Override
-from ..parametric.record import read_building, read_terrain_lines
+from ..parametric.record import read_building
 from ..stages.remarks import add_remark
 from ..status import Change, ChangeKind, Doubt, Status
 from ..write.fragments import Fragments
@@ -112,11 +112,8 @@ def judge_tile(folder: str, tile: str, terrain: str | None = None) -> list[float
         job = updater.plan.jobs[index]
         with pass_over_failure(job):
             record = members[index]["record"] or {"id": ""}
-            earlier, roof = read_building(record)
-            if roof is None or earlier.status is Status.FROM_ATTRIBUTES:
-                continue
-            verdict = updater.judge(job, record, earlier, roof)
-            if verdict.change in TESTED:
+            verdict = updater.judge(job, record, *read_building(record))
+            if verdict is not None and verdict.change in TESTED:
                 chances.append(1.0 if verdict.change is Change.UNCERTAIN else verdict.chance)
     return chances
 
@@ -142,48 +139,45 @@ class Updater:
         """Return a building brought up to date."""
         if member.record is None:
             return self.replace_earlier(job, member)
-        # lines of terrain judge nothing, and reading them takes long
-        earlier, roof = read_building(member.record | {"terrain_line": []})
-        if roof is None or earlier.status is Status.FROM_ATTRIBUTES:
-            return self.revisit_empty(job, member)
+        earlier, roof = read_building(member.record)
         verdict = self.judge(job, member.record, earlier, roof)
-        c = verdict.comparison
-        unseen = [] if c is None or verdict.change in UNDIVIDED else find_unseen(roof, c)
+        if roof is None or verdict is None:
+            return self.revisit_empty(job, member, earlier)
+        is_divided = verdict.change not in UNDIVIDED
+        unseen = find_unseen(roof, verdict.comparison) if is_divided else []
         if verdict.change is Change.UNCHANGED and member.is_same_outline and not unseen:
             kept = self.refine(job, member.record) if self.surveys.refine else None
             kept = kept or keep_texts(earlier, member.record, self.texts)
             if kept is not None:
                 return kept
-        lines = tuple(read_terrain_lines(member.record))
-        earlier = dataclasses.replace(earlier, terrain_intersection=lines)
         earlier = with_model(earlier, roof, self.plan.settings.compose)
-        lost = LostParts.find(verdict, roof, Ground.under(earlier))
+        lost = LostParts.find(verdict, roof)
         result = self.follow_verdict(job, member, earlier, verdict, lost)
         places = record_places(unseen, roof.frame)
         if places and result is earlier:
-            verdict = dataclasses.replace(verdict, change=Change.NOT_COVERED)
-            return self.mark(earlier, verdict, places, member)
+            return self.mark(earlier, Change.NOT_COVERED, verdict.chance, places, member)
         if places and result.change:
             change = result.change | {"places": [*result.change["places"], *places]}
             result = dataclasses.replace(result, change=change)
         return result if lost is None else lost.doubt(result)
 
     def judge(
-        self, job: Job, record: dict[str, Any], earlier: Building, roof: Roof
-    ) -> ChangeVerdict:
-        """Return the verdict on an earlier building by the points of both surveys."""
+        self, job: Job, record: dict[str, Any], earlier: Building, roof: Roof | None
+    ) -> ChangeVerdict | None:
+        """Return the verdict on an earlier building by the points of both surveys.
+
+        None where its roof was made of no points.
+        """
+        if roof is None or earlier.status is Status.FROM_ATTRIBUTES:
+            return None
         old, new = self.epochs.select(job, record)
         frame, shift = roof.frame, self.surveys.shift
         unexplained = earlier.quality.unexplained_area_m2
-
-        def read_lines() -> list[np.ndarray]:
-            return [frame.to_local(line) for line in read_terrain_lines(record)]
-
         return judge_building(
             roof,
             None if old is None else frame.to_local(old),
             frame.to_local(new),
-            Ground(earlier.z_ground - frame.origin[2], read_lines),
+            Ground.under(earlier, frame),
             shift.noise,
             shift.sigma[2],
             self.surveys.largest_chance,
@@ -243,36 +237,32 @@ class Updater:
         lost: LostParts | None,
     ) -> Building:
         """Return the building that a verdict leads to."""
-        frame = earlier.roof.frame
-        if verdict.change is Change.GONE:
+        frame, change, chance = earlier.roof.frame, verdict.change, verdict.chance
+        if change is Change.GONE:
             places = record_places([demolish(earlier)], frame)
-            return self.mark(end_building(earlier), verdict, places, member)
-        if verdict.change is Change.NOT_COVERED:
-            return self.mark(earlier, verdict, [], member)
+            return self.mark(end_building(earlier), change, chance, places, member)
+        if change is Change.NOT_COVERED:
+            return self.mark(earlier, change, chance, [], member)
         if not member.is_same_outline:
             return self.redraw(job, member, earlier, verdict, lost)
-        if verdict.change is Change.UNCHANGED:
+        if change is Change.UNCHANGED:
             return earlier
-        if verdict.change is Change.UNCERTAIN:
-            places = record_places(name_doubts(verdict), frame)
-            return self.mark(earlier, verdict, places, member)
+        doubts = record_places(name_doubts(verdict), frame)
+        if change is Change.UNCERTAIN:
+            return self.mark(earlier, change, chance, doubts, member)
         moved = self.move(job, member, earlier, verdict)
         if moved is not None:
-            places = self.name_places(earlier, moved, verdict)
-            return self.mark(moved, verdict, places, member, list(range(len(moved.parts))))
+            places, lineage = self.name_places(earlier, moved, verdict), range(len(moved.parts))
+            return self.mark(moved, change, chance, places, member, list(lineage))
         new = self.reconstruct(job, member, lost)
         if new.built is None or not explains(
-            move_to_frame(new.roof, earlier.roof), earlier.roof, verdict, Ground.under(earlier)
+            move_to_frame(new.roof, earlier.roof), earlier.roof, verdict
         ):
             places = self.name_places(earlier, None, verdict)
             if {place["kind"] for place in places} == {ChangeKind.PART_REMOVED.code}:
-                return self.mark(earlier, verdict, places, member)  # no pulse passes a roof
-            verdict = dataclasses.replace(verdict, change=Change.UNCERTAIN)
-            return self.mark(earlier, verdict, record_places(name_doubts(verdict), frame), member)
-        points = select_roof(self.epochs.new, job).points
-        result, lineage = continue_parts(earlier, new, self.near_m, points)
-        places = self.name_places(earlier, result, verdict)
-        return self.mark(result, verdict, places, member, lineage)
+                return self.mark(earlier, change, chance, places, member)  # no pulse passes a roof
+            return self.mark(earlier, Change.UNCERTAIN, chance, doubts, member)
+        return self.replace_model(job, member, earlier, verdict, new)
 
     def move(
         self, job: Job, member: UpdateMember, earlier: Building, verdict: ChangeVerdict
@@ -300,8 +290,7 @@ class Updater:
         `result` is its new model, None where no new model explains the points.
         """
         roof = None if result is None else move_to_frame(result.roof, earlier.roof)
-        sigma, ground = self.surveys.shift.sigma[2], Ground.under(earlier)
-        found = name_differences(verdict, earlier.roof, roof, ground, sigma)
+        found = name_differences(verdict, earlier.roof, roof, self.surveys.shift.sigma[2])
         return record_places(found, earlier.roof.frame)
 
     def redraw(
@@ -315,23 +304,32 @@ class Updater:
         """Return a building over another outline than before."""
         new = self.reconstruct(job, member, lost)
         if new.built is None:
-            verdict = dataclasses.replace(verdict, change=Change.UNCERTAIN)
-            return self.mark(earlier, verdict, [], member)
-        points = select_roof(self.epochs.new, job).points
-        result, lineage = continue_parts(earlier, new, self.near_m, points)
-        is_changed = verdict.change is Change.CHANGED
-        places = self.name_places(earlier, result, verdict) if is_changed else []
+            return self.mark(earlier, Change.UNCERTAIN, verdict.chance, [], member)
         before = earlier.roof.world_outline
         apart = shapely.symmetric_difference(before, job.area)
         outline = Difference(
             ChangeKind.OUTLINE_CHANGED, math.nan, math.nan, job.area.area - before.area, apart
         )
-        is_first = apart.area > max((place["area"] for place in places), default=0.0)
-        redrawn = record_places([outline])
-        places = [*redrawn, *places] if is_first else [*places, *redrawn]
-        return self.mark(
-            result, dataclasses.replace(verdict, change=Change.CHANGED), places, member, lineage
-        )
+        return self.replace_model(job, member, earlier, verdict, new, outline)
+
+    def replace_model(
+        self,
+        job: Job,
+        member: UpdateMember,
+        earlier: Building,
+        verdict: ChangeVerdict,
+        new: Building,
+        outline: Difference | None = None,
+    ) -> Building:
+        """Return the `new` building in place of the earlier one, perhaps over another outline."""
+        points = select_roof(self.epochs.new, job).points
+        result, lineage = continue_parts(earlier, new, self.near_m, points)
+        is_changed = verdict.change is Change.CHANGED
+        places = self.name_places(earlier, result, verdict) if is_changed else []
+        if outline is not None:
+            is_first = outline.place.area > max((place["area"] for place in places), default=0.0)
+            places.insert(0 if is_first else len(places), *record_places([outline]))
+        return self.mark(result, Change.CHANGED, verdict.chance, places, member, lineage)
 
     def replace_earlier(self, job: Job, member: UpdateMember) -> Building:
         """Return the building of a new footprint that is no earlier building."""
@@ -340,11 +338,11 @@ class Updater:
             return new
         if not member.predecessors:
             is_bare = self.was_bare(job)
-            return self.mark(new, ChangeVerdict(Change.NEW, 0.0), place_new(new, is_bare), member)
+            return self.mark(new, Change.NEW, 0.0, place_new(new, is_bare), member)
         one = len(member.predecessors) == 1
         kind = ChangeKind.SPLIT if one else ChangeKind.MERGED
         place = Difference(kind, math.nan, math.nan, job.area.area, job.area, (-1, 0))
-        return self.mark(new, ChangeVerdict(Change.CHANGED), record_places([place]), member)
+        return self.mark(new, Change.CHANGED, 1.0, record_places([place]), member)
 
     def was_bare(self, job: Job) -> bool:
         """Return whether the earlier survey shows bare ground over most of an outline."""
@@ -356,20 +354,19 @@ class Updater:
         cells = np.unique(np.floor(bare[:, :2]), axis=0)
         return len(cells) >= BARE_SHARE * job.area.area
 
-    def revisit_empty(self, job: Job, member: UpdateMember) -> Building:
+    def revisit_empty(self, job: Job, member: UpdateMember, earlier: Building) -> Building:
         """Return what the new points make of a building that no earlier points showed."""
         new = self.reconstruct(job, member)
         if new.built is None or new.status is Status.FROM_ATTRIBUTES:
             return build(member.record or {}, self.plan.settings.compose)
-        earlier = read_building(member.record or {})[0]
         is_bare = earlier.status is Status.NO_BUILDING or Doubt.BARE_GROUND.value in earlier.detail
-        places = place_new(new, is_bare)
-        return self.mark(new, ChangeVerdict(Change.NEW, 0.0), places, member, [])
+        return self.mark(new, Change.NEW, 0.0, place_new(new, is_bare), member, [])
 
     def mark(
         self,
         building: Building,
-        verdict: ChangeVerdict,
+        change: Change,
+        chance: float,
         places: list[dict[str, Any]],
         member: UpdateMember,
         lineage: list[int | None] | None = None,
@@ -380,11 +377,11 @@ class Updater:
         that takes the place of the earlier one.
         """
         before = (member.record or {}).get("change") or {}
-        survey, change = self.surveys.date, verdict.change
+        survey = self.surveys.date
         record = {
             "class": change.code,
             "survey": survey,
-            "chance": float(f"{verdict.chance:.3g}"),
+            "chance": float(f"{chance:.3g}"),
             "places": places,
             "lineage": lineage or [],
             "predecessors": list(member.predecessors),
