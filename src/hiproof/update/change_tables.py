@@ -43,7 +43,6 @@ CHANGE_COLUMNS: dict[str, type] = {
 
 Roofs outside all outlines have the last two.
 """
-PLACE_FIGURES = tuple(name.removesuffix("_m2").removesuffix("_m") for name in CHANGE_COLUMNS)[3:]
 TABLE_COLUMNS: dict[str, type] = {
     **CHANGE_COLUMNS,
     "chance": float,
@@ -144,53 +143,42 @@ def write_csv(
     with path.open("w", encoding="utf-8", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(TABLE_COLUMNS)
-        table.writerows(make_row(change) for change in changes)
+        table.writerows(make_row(change, TABLE_COLUMNS) for change in changes)
         table.writerows((same | {"id": name}).values() for name in unchanged)
 
 
-def make_row(change: FoundChange) -> tuple[Any, ...]:
-    """Return the values of a building: those of its largest place come first."""
+def make_row(
+    change: FoundChange, columns: dict[str, type], place: dict[str, Any] | None = None
+) -> tuple[Any, ...]:
+    """Return the values of a building at one place, None for its largest."""
     found = change.record["change"]
-    place: dict[str, Any] = next(iter(found["places"]), {})
-    return (
-        change.record["id"],
-        found["class"],
-        place.get("kind"),
-        *(place.get(name) for name in PLACE_FIGURES),
-        found["chance"],
-        found["survey"],
-        len(found["places"]),
-        " ".join(map(str, found["predecessors"])) or None,
-    )
-
-
-def make_place_rows(change: FoundChange) -> list[tuple[Any, ...]]:
-    """Return the values of the places of a building."""
-    found = change.record["change"]
-    return [
-        (
-            change.record["id"],
-            found["class"],
-            place.get("kind"),
-            *(place.get(name) for name in PLACE_FIGURES),
-            *(place.get("parts") or (None, None)),
-        )
-        for place in found["places"]
-    ]
+    place = next(iter(found["places"]), {}) if place is None else place
+    old_part, new_part = place.get("parts") or (None, None)
+    values = place | {
+        "id": change.record["id"],
+        "class": found["class"],
+        "chance": found["chance"],
+        "survey": found["survey"],
+        "places": len(found["places"]),
+        "predecessors": " ".join(map(str, found["predecessors"])) or None,
+        "old_part": old_part,
+        "new_part": new_part,
+    }
+    return tuple(values.get(name.removesuffix("_m2").removesuffix("_m")) for name in columns)
 
 
 def write_geopackage(path: Path, changes: list[FoundChange], head: FileHead) -> None:
     """Write the layers of buildings and of places, with their QGIS style."""
     buildings = [c for c in changes if c.record["change"]["class"] != OUTSIDE_CLASS]
-    outlines, rows = [c.outline for c in buildings], [make_row(c) for c in buildings]
+    outlines, rows = [c.outline for c in buildings], [make_row(c, TABLE_COLUMNS) for c in buildings]
     add_layer(path, BUILDINGS_LAYER, TABLE_COLUMNS, outlines, rows, head)
-    places = [
+    places = [(change, place) for change in changes for place in change.record["change"]["places"]]
+    areas = [
         shapely.union_all([polygon(rings, "an outline") for rings in place.get("outlines") or []])
-        for change in changes
-        for place in change.record["change"]["places"]
+        for _, place in places
     ]
-    rows = [row for change in changes for row in make_place_rows(change)]
-    add_layer(path, PLACES_LAYER, PLACE_COLUMNS, places, rows, head)
+    rows = [make_row(change, PLACE_COLUMNS, place) for change, place in places]
+    add_layer(path, PLACES_LAYER, PLACE_COLUMNS, areas, rows, head)
     write_styles(path, CHANGE_STYLES)
 
 
