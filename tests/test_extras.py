@@ -205,6 +205,10 @@ def test_training_names_its_extra(hide_package):
         hiproof.learn.train  # noqa: B018
 
 
+def test_training_is_an_attribute_of_the_package():
+    assert run_python("import hiproof; print(hiproof.learn.__name__)") == "hiproof.learn\n"
+
+
 @pytest.mark.parametrize(
     "arguments", [{}, {"fit": {"parts": "one"}, "segment": {"network": "never"}}]
 )

@@ -478,12 +478,13 @@ def test_tables_override_too(town_files, tmp_path):
         ('{"id": "a", "type": "hip"}\n{"id": "a", "type": "gable"}\n', "two that differ of 'a'"),
         ('{"id": "a", "type": "hip"\n', "line 1 of .* column"),
         ('\n{"id": "a", "type": "igloo"}\n', "line 2 of .*: expected roof types"),
+        ('{"id": "café", "type": "hip"}\n'.encode("latin-1"), "save it as UTF-8"),
     ],
 )
 def test_overrides_that_cannot_be_read_are_refused_before_anything_is_redone(
     text, message, town_files, tmp_path
 ):
-    (tmp_path / "o.jsonl").write_text(text)
+    (tmp_path / "o.jsonl").write_bytes(text if isinstance(text, bytes) else text.encode())
     with pytest.raises(InputError, match=message):
         run_with_overrides(town_files, tmp_path, "o.jsonl")
     assert not list((tmp_path / "out").glob("*.gml"))

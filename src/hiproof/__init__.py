@@ -80,6 +80,8 @@ __all__ = ["__version__", *sorted(_HOME)]
 
 def __getattr__(name: str) -> Any:
     """Import a public name from its module when it is first asked for (PEP 562)."""
+    if name == "learn":  # whose names are under its own
+        return import_module(".learn", __name__)
     if name not in _HOME:
         raise AttributeError(f"module 'hiproof' has no attribute {name!r}")
     value = getattr(import_module(f".{_HOME[name]}", __name__), name)

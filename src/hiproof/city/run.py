@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import __version__
-from ..errors import InputError, OutputError
+from ..errors import InputError
 from ..evaluate.overview import Overview
 from ..formats import list_model_paths
 from ..frames import METRES, Units
@@ -30,7 +30,7 @@ from ..write.files import save_text
 from ..write.head import FileHead
 from .folder.ledger import Failure, Ledger
 from .folder.marks import hold_folder
-from .folder.resume import open_ledger, open_state, resume_or_plan
+from .folder.resume import explain_full_disk, open_ledger, open_state, resume_or_plan
 from .merge.join import TEXTS_FOLDER, claims, merge, output_files
 from .plan.checks import refuse_unusable
 from .plan.from_cloud import Progress
@@ -175,10 +175,7 @@ def reconstruct_in_folder(
         clean(state, ledger)
         return summary
     except sqlite3.OperationalError as error:
-        raise OutputError(
-            f"expected to write the ledger in {state}, got: {error}; free some space, the same "
-            "command then goes on"
-        ) from error
+        raise explain_full_disk(state, error) from error
     finally:
         executor.close()
         with suppress(sqlite3.Error):

@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import InputError, SettingsError
 from ..read.crs import NAMED_UNITS, parse_crs
 from ..read.models.cityjson import ESCAPED
-from ..read.models.damage import Damaged, excerpt, readable, refuse
+from ..read.models.damage import Damaged, excerpt, explain_unreadable, readable, refuse
 from ..read.plausible import is_place
 from ..settings import Settings
 from ..write.head import FileHead
@@ -51,11 +51,8 @@ def opened_parameters(
             lines = objects(file, path, damaged)
             yield read_head(next(lines, None), path), records(lines, path, damaged)
     except (OSError, UnicodeDecodeError) as error:
-        text = "none" if isinstance(error, FileNotFoundError) else f"something else: {error}"
-        raise InputError(
-            f"expected a parameters.jsonl that hiproof wrote at {os.fspath(path)}, got {text}; "
-            "check the path"
-        ) from error
+        expected = "a parameters.jsonl that hiproof wrote"
+        raise explain_unreadable(os.fspath(path), expected, error) from error
 
 
 def objects(

@@ -20,6 +20,7 @@ from ..read.crs import (
     describe_crs,
     find_best_transformer,
     find_units,
+    has_heights,
     horizontal_crs,
     parse_crs,
     same_horizontal,
@@ -149,10 +150,6 @@ def height_way(crs: Any, out: Any) -> Any:
             "stay as they are"
         )
     return way
-
-
-def has_heights(crs: Any) -> bool:
-    return vertical_crs(crs) is not None or len(crs.axis_info) == 3
 
 
 def same_height_system(crs: Any, out: Any) -> bool:

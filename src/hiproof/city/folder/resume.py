@@ -72,15 +72,20 @@ def open_ledger(state: Path, restart: bool) -> Ledger:
                 path.with_name(path.name + end).unlink(missing_ok=True)
             return open_ledger(state, False)
         if is_full:
-            raise OutputError(
-                f"expected to write the ledger in {state}, got: {error}; free some space, the same "
-                "command then goes on"
-            ) from error
+            raise explain_full_disk(state, error) from error
         raise OutputError(
             f"expected the ledger of a run of this version in {state}, got: {error}; begin anew "
             "with --restart, or choose another --out"
         ) from error
     return ledger
+
+
+def explain_full_disk(state: Path, error: Exception) -> OutputError:
+    """Make the error for a ledger that cannot be written."""
+    return OutputError(
+        f"expected to write the ledger in {state}, got: {error}; free some space, the same "
+        "command then goes on"
+    )
 
 
 def resume_or_plan(

@@ -18,6 +18,7 @@ import numpy as np
 from ...errors import InputError, InputWarning
 from ...log import count_things
 from ...masking import mask
+from ...read.models.damage import explain_unreadable
 from ...read.numbers import (
     FIRST_YEAR,
     LAST_YEAR,
@@ -93,9 +94,7 @@ def override_records(path: str) -> Iterator[tuple[str, dict[str, Any]]]:
                 if not is_other_line(record):
                     yield f"line {number} of {path}", record
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(
-            f"expected overrides (JSONL or a table) at {path}, got: {error}; check the path"
-        ) from error
+        raise explain_unreadable(path, "overrides (JSONL or a table)", error) from error
 
 
 def is_other_line(record: Any) -> bool:

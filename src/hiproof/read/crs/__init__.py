@@ -146,6 +146,11 @@ def vertical_crs(crs: CRS) -> CRS | None:
     return heights[0] if heights else None
 
 
+def has_heights(crs: CRS) -> bool:
+    """Return whether a CRS says what its heights are."""
+    return vertical_crs(crs) is not None or len(crs.axis_info) == 3
+
+
 def names_place(crs: CRS | None) -> bool:
     """Return whether coordinates in `crs` have a place on the Earth.
 

@@ -20,7 +20,7 @@ from ...frames import METRES, Units
 from ...model import GROUND, ROOF, WALL
 from ..crs import find_named_units, refuse_other_crs
 from ..plausible import is_plausible
-from .damage import Damaged, excerpt, readable, refuse
+from .damage import Damaged, excerpt, explain_unreadable, readable, refuse
 
 Rings = tuple[tuple[int, ...], ...]
 
@@ -252,7 +252,7 @@ def documents(path: Path, damaged: Damaged = refuse) -> Iterator[tuple[dict[str,
                     f"building {id:.80} in {place}" if isinstance(id, str) and id else place,
                 )
     except (OSError, UnicodeDecodeError) as error:
-        raise unreadable(path, error) from error
+        raise explain_unreadable(path, "a readable text file", error) from error
     if not seen_header:
         raise InputError(
             f"expected a CityJSON line at the start of {path}, got an empty file; write it anew"
@@ -302,15 +302,7 @@ def read_text(path: Path) -> str:
     try:
         return path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        raise unreadable(path, error) from error
-
-
-def unreadable(path: Path, error: Exception) -> InputError:
-    """Make the error for a file that is missing or whose bytes are no text."""
-    text = "none" if isinstance(error, FileNotFoundError) else f"one that is not: {error}"
-    if isinstance(error, UnicodeDecodeError):
-        text = "one that is not in UTF-8"
-    return InputError(f"expected a readable text file at {path}, got {text}; check the path")
+        raise explain_unreadable(path, "a readable text file", error) from error
 
 
 def reference_system(document: dict[str, Any]) -> str | None:

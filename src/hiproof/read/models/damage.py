@@ -80,6 +80,17 @@ def readable(value: Any) -> Any:
     return [readable(inner) for inner in value] if isinstance(value, list) else value
 
 
+def explain_unreadable(path: Any, expected: str, error: Exception) -> InputError:
+    """Make the error for a text file that is missing, or whose bytes are no text."""
+    if isinstance(error, UnicodeDecodeError):
+        got = "one that is not in UTF-8; save it as UTF-8"
+    elif isinstance(error, FileNotFoundError):
+        got = "none; check the path"
+    else:
+        got = f"one that is not: {error}; check the path"
+    return InputError(f"expected {expected} at {path}, got {got}")
+
+
 def finite(value: Any) -> Any:
     """Replace NaN and infinities in a JSON value by null: JSON does not know them."""
     if isinstance(value, dict):

@@ -21,6 +21,7 @@ from ....read.crs import (
     describe_crs,
     find_best_transformer,
     find_units,
+    has_heights,
     horizontal_crs,
     parse_crs,
     vertical_crs,
@@ -129,8 +130,8 @@ class Globe:
 
 def with_heights(crs: Any) -> Any:
     """Return the transformer of plan and heights, None where it would be a guess."""
-    has_heights = vertical_crs(crs) is not None or len(crs.axis_info) == 3
-    return find_best_transformer(crs, GEOGRAPHIC_CRS, allow_ballpark=False) if has_heights else None
+    known = has_heights(crs)
+    return find_best_transformer(crs, GEOGRAPHIC_CRS, allow_ballpark=False) if known else None
 
 
 def explain_heights(crs: Any, exact: Any, geoid_height_m: float | None) -> tuple[str, bool]:
