@@ -223,7 +223,7 @@ def test_missing_and_binary_files_raise_a_sentence(tmp_path):
     with pytest.raises(InputError, match="got none"):
         list(read_solids(tmp_path / "none.json"))
     (tmp_path / "binary.json").write_bytes(b"\xff\xfe\x00\x81")
-    with pytest.raises(InputError, match="readable text.*; save it as UTF-8"):
+    with pytest.raises(InputError, match=r"readable text.*; save it as UTF-8"):
         list(read_solids(tmp_path / "binary.json"))
 
 

@@ -21,7 +21,7 @@ import shapely
 
 from ..fit.direction import measure_support, quarter_gap
 from ..geometry.grid import expand
-from ..geometry.rings import OVERLAY_GRID_M, with_area
+from ..geometry.rings import intersect, subtract, unite
 from .surfaces import Surfaces, find_surfaces
 
 BOND_REACH_M, REACH_SPACINGS = 1.25, 2.2  # length of a bond, at most
@@ -153,7 +153,7 @@ def separate_houses(
     roofs = Roofs(surfaces.xyz[roof, :2], surfaces.own_m2[roof] * np.abs(normal[:, 2]), normal)
     bonds = find_bonds(surfaces)
     houses = [
-        with_area(shapely.intersection(house, block))
+        intersect(house, block)
         for block in without_necks(
             shapely.transform(area, lambda xy: xy - origin[:2]), gap_m, roofs
         )
@@ -176,8 +176,8 @@ def without_necks(area: shapely.Geometry, gap_m: float, roofs: Roofs) -> list[sh
     sides, remainder = [], area
     for part in shapely.get_parts(wide):
         side = shapely.buffer(part, 0.5 * NECK_M, join_style="mitre")
-        sides.append(with_area(shapely.intersection(remainder, side)))
-        remainder = with_area(shapely.difference(remainder, side, grid_size=OVERLAY_GRID_M))
+        sides.append(intersect(remainder, side))
+        remainder = subtract(remainder, side)
     return with_crumbs([*sides, *shapely.get_parts(remainder)], roofs)
 
 
@@ -401,7 +401,7 @@ def cut_area(area: shapely.Geometry, cut: Cut) -> list[shapely.Geometry]:
         [cut.at(lower), cut.at(upper), cut.at(upper, side * distant), cut.at(lower, side * distant)]
         for side in (-1, 1)
     ]
-    halves = [shapely.intersection(area, shapely.Polygon(half)) for half in halves]
+    halves = [intersect(area, shapely.Polygon(half)) for half in halves]
     parts = [part for half in halves for part in shapely.get_parts(half) if part.area > 0.0]
     group, fixed = list(range(len(parts))), cut.runs[cut.runs[:, 2] == 0]
     for segment in shapely.get_parts(
@@ -433,8 +433,4 @@ def with_crumbs(sides: list[shapely.Geometry], roofs: Roofs) -> list[shapely.Geo
 
 def join_areas(areas: list[shapely.Geometry]) -> shapely.Geometry:
     """Return the union of polygons that share nothing but border."""
-    return (
-        with_area(shapely.union_all(areas, grid_size=OVERLAY_GRID_M))
-        if len(areas) > 1
-        else areas[0]
-    )
+    return unite(areas) if len(areas) > 1 else areas[0]

@@ -12,7 +12,7 @@ import shapely
 from ..errors import CompositionError
 from ..geometry.components import label_components
 from ..geometry.outline_edges import FARTHEST_MITRE, OutlineEdges, list_outline_edges, make_strips
-from ..geometry.rings import OVERLAY_GRID_M, repair_polygons, with_area
+from ..geometry.rings import repair_polygons, subtract, unite, with_area
 from ..model import GROUND, ROOF, Eaves, Model, Overhang, Piece, Roof, Solid
 from ..model.overhang import ROOF_EDGE, WALLS
 from ..settings import ComposeSettings, Settings
@@ -32,7 +32,7 @@ def set_walls_in(
     """Return areas of walls `widths` (n,) inside an outline, `least_width_m` apart at least."""
     strips = make_strips(list_outline_edges(outline), widths, side=-1.0)
     taken = [repair_polygons(shapely.polygons(strips[k])) for k in np.flatnonzero(widths)]
-    rest = shapely.difference(outline, shapely.union_all(taken), grid_size=OVERLAY_GRID_M)
+    rest = subtract(outline, shapely.union_all(taken))
     walls = tidy_walls(rest, outline, least_width_m)
     if walls.is_empty:
         raise CompositionError(
@@ -194,7 +194,7 @@ def widen_roof(roof: Roof, widths: np.ndarray) -> Roof:
     strips = make_strips(edges, widths)
     number_of = np.flatnonzero(widths)
     areas = [roof.outline, *repair_polygons(shapely.polygons(strips[number_of]))]
-    area = with_area(shapely.union_all(areas, grid_size=OVERLAY_GRID_M))
+    area = unite(areas)
     if area.geom_type != "Polygon":
         raise CompositionError(
             "expected overhangs around one roof, got several areas; leave them out"
@@ -226,7 +226,7 @@ def widen_piece(
     if not added:
         yield piece
         return
-    union = shapely.union_all([repair_polygons(piece.outline), *added], grid_size=OVERLAY_GRID_M)
+    union = unite([repair_polygons(piece.outline), *added])
     for outline in shapely.get_parts(with_area(union)):
         yield Piece(outline, piece.planes)
 
@@ -272,7 +272,7 @@ def cut_strip(
         outer_a if start == 0.0 else a + start * (b - a) + across,
     ]
     polygon = repair_polygons(shapely.polygons(corners))  # mitres at a short edge may cross
-    return with_area(shapely.difference(polygon, outline, grid_size=OVERLAY_GRID_M))
+    return subtract(polygon, outline)
 
 
 # Most solids that are made of one building: five overhangs of thirty can fail. Each takes a tenth

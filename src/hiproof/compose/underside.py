@@ -21,7 +21,7 @@ import numpy as np
 import shapely
 
 from ..errors import CompositionError
-from ..geometry.rings import list_between, with_area
+from ..geometry.rings import intersect, list_between, subtract, unite, with_area
 from ..model import CEILING, GROUND, ROOF, WALL, Face, Model, Passage, Solid, Underside
 from ..settings import ComposeSettings
 from .arrangement import GRID_M
@@ -321,16 +321,16 @@ def cut_cells(area: shapely.Polygon, passages: Iterable[Passage]) -> list[Ground
     for passage in passages:
         outline = shapely.transform(passage.outline, lambda xy: np.rint(xy / GRID_M))
         outline = snap_corners(outline, area)
-        covered = with_area(shapely.intersection(outline, rest, grid_size=1.0))
-        remainder = with_area(shapely.difference(rest, covered, grid_size=1.0))
+        covered = intersect(outline, rest, 1.0)
+        remainder = subtract(rest, covered, 1.0)
         slivers = [
             part
             for part in shapely.get_parts(remainder)
             if shapely.buffer(part, -SNAP_UNITS / 2).is_empty
         ]
         if slivers:
-            covered = with_area(shapely.union_all([covered, *slivers], grid_size=1.0))
-            remainder = with_area(shapely.difference(rest, covered, grid_size=1.0))
+            covered = unite([covered, *slivers], 1.0)
+            remainder = subtract(rest, covered, 1.0)
         ceiling = round(passage.ceiling / GRID_M)
         cells += [GroundCell(part, ceiling) for part in list_areas(covered)]
         rest = remainder

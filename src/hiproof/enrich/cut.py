@@ -13,7 +13,7 @@ import numpy as np
 import shapely
 
 from ..compose import check_solid
-from ..geometry.rings import list_between, with_area
+from ..geometry.rings import intersect, list_between, subtract
 from ..model import Face, Solid
 from .walls import Wall
 
@@ -68,17 +68,13 @@ def cut_polygon(
     rest: shapely.Geometry = shapely.set_precision(polygon, GRID_M)
     party: list[Piece] = []
     for name, region in regions:
-        outside = drop_thin(subtract(rest, region), thinnest)
-        inside = drop_thin(subtract(rest, outside), thinnest)
+        outside = drop_thin(subtract(rest, region, GRID_M), thinnest)
+        inside = drop_thin(subtract(rest, outside, GRID_M), thinnest)
         if inside.is_empty:
             continue
         party += [(name, part) for part in list_parts(inside)]
-        rest = subtract(rest, inside)
+        rest = subtract(rest, inside, GRID_M)
     return [*party, *(("", part) for part in list_parts(rest))]
-
-
-def subtract(area: shapely.Geometry, other: shapely.Geometry) -> shapely.Geometry:
-    return with_area(shapely.difference(area, other, grid_size=GRID_M))
 
 
 def list_parts(area: shapely.Geometry) -> list[shapely.Polygon]:
@@ -91,7 +87,7 @@ def drop_thin(area: shapely.Geometry, thinnest: float) -> shapely.Geometry:
     half = thinnest / 2
     core = shapely.buffer(area, -half, join_style="mitre", mitre_limit=MOST_MITRE)
     grown = shapely.buffer(core, half, join_style="mitre", mitre_limit=MOST_MITRE)
-    return with_area(shapely.intersection(area, grown, grid_size=GRID_M))
+    return intersect(area, grown, GRID_M)
 
 
 def rebuild(

@@ -1,4 +1,4 @@
-"""Rings: the grid for unions, repair, direction and size."""
+"""Rings and areas: overlays on a grid, repair, direction and size."""
 
 from __future__ import annotations
 
@@ -68,6 +68,25 @@ def with_area(geometry: shapely.Geometry) -> shapely.Geometry:
     """
     polygons = [part for part in shapely.get_parts(geometry) if part.geom_type == "Polygon"]
     return polygons[0] if len(polygons) == 1 else shapely.MultiPolygon(polygons)
+
+
+def intersect(
+    area: shapely.Geometry, other: shapely.Geometry, grid_m: float = OVERLAY_GRID_M
+) -> shapely.Geometry:
+    """Return what lies in both areas."""
+    return with_area(shapely.intersection(area, other, grid_size=grid_m))
+
+
+def subtract(
+    area: shapely.Geometry, other: shapely.Geometry, grid_m: float = OVERLAY_GRID_M
+) -> shapely.Geometry:
+    """Return what lies in an area and not in the other."""
+    return with_area(shapely.difference(area, other, grid_size=grid_m))
+
+
+def unite(areas: Any, grid_m: float = OVERLAY_GRID_M) -> shapely.Geometry:
+    """Return what lies in any of the `areas` (n,)."""
+    return with_area(shapely.union_all(areas, grid_size=grid_m))
 
 
 def list_between(

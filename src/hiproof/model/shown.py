@@ -15,7 +15,7 @@ from itertools import accumulate, chain
 import numpy as np
 import shapely
 
-from ..geometry.rings import repair_polygons, with_area
+from ..geometry.rings import intersect, repair_polygons, subtract, unite
 from .roof import Part, Roof
 from .solid import ROOF, Face, Solid
 
@@ -31,7 +31,7 @@ def unite_visible_pieces(
     roof: Roof, visible: Sequence[Sequence[shapely.Geometry]]
 ) -> list[shapely.Geometry]:
     """Return each part's visible area in world coordinates, empty for a hidden part."""
-    united = [with_area(shapely.union_all(pieces, grid_size=GRID_M)) for pieces in visible]
+    united = [unite(pieces, GRID_M) for pieces in visible]
     return shapely.transform(np.array(united, object), roof.frame.to_world).tolist()
 
 
@@ -95,14 +95,12 @@ def share_surface(
     Returns what remains, and what goes to the part drawn as `other`: the area where that part alone
     is drawn, and slivers beside it.
     """
-    slivers = without_slivers(shapely.difference(area, drawn_area, grid_size=GRID_M))
-    others_own = without_slivers(shapely.intersection(slivers, other, grid_size=GRID_M))
+    slivers = without_slivers(subtract(area, drawn_area, GRID_M))
+    others_own = without_slivers(intersect(slivers, other, GRID_M))
     if others_own.is_empty:
         return area, others_own
-    remainder = without_slivers(shapely.difference(area, others_own, grid_size=GRID_M))
-    return remainder, without_slivers(
-        shapely.difference(area, remainder, grid_size=GRID_M), least_m2=0.0
-    )
+    remainder = without_slivers(subtract(area, others_own, GRID_M))
+    return remainder, without_slivers(subtract(area, remainder, GRID_M), least_m2=0.0)
 
 
 def without_slivers(

@@ -17,7 +17,7 @@ import numpy as np
 import shapely
 
 from ..errors import InputError
-from ..geometry.rings import repair_polygons, with_area
+from ..geometry.rings import intersect, repair_polygons, subtract, unite
 from ..model import Roof
 from ..primitives.cants import keep_cants_in_place
 from .change import make_polygon, with_sizes
@@ -95,9 +95,7 @@ def merged_parts(item: dict[str, Any], other: dict[str, Any]) -> dict[str, Any]:
     parameters = resize_rectangle(parameters, "width", float(upper[1] - lower[1]))
     moved = np.array([x, y]) - main["position"][:2]
     parameters = keep_cants_in_place(parameters, float(moved @ along), float(moved @ across))
-    together = shapely.union_all(
-        [make_polygon(o) for part in (main, side) for o in part["outlines"]], grid_size=GRID_M
-    )
+    together = unite([make_polygon(o) for part in (main, side) for o in part["outlines"]], GRID_M)
     merged = {key: value for key, value in main.items() if key != "sigma"}
     position = [float(x), float(y), main["position"][2]]
     return {
@@ -175,10 +173,8 @@ def cut_outlines(outlines: list[Any], place: np.ndarray, direction: np.ndarray) 
     ring = place + FAR_M * np.array(
         [-perpendicular, perpendicular, perpendicular + direction, direction - perpendicular]
     )
-    overlap = shapely.intersection(
-        shapely.union_all([make_polygon(o) for o in outlines]),
-        shapely.Polygon(ring),
-        grid_size=GRID_M,
+    overlap = intersect(
+        shapely.union_all([make_polygon(o) for o in outlines]), shapely.Polygon(ring), GRID_M
     )
     rings = list_rings(overlap)
     if not rings:
@@ -239,12 +235,10 @@ def moved_along(
     """Return the part, leaving out `new` if it left out `old`."""
     if "outlines" not in part or old.equals(new):
         return part
-    shared = with_area(
-        shapely.intersection(cover_rectangle(with_sizes(part)), old, grid_size=GRID_M)
-    )
+    shared = intersect(cover_rectangle(with_sizes(part)), old, GRID_M)
     if shared.area < LEAST_M2 or roofed_by(part).intersection(shared).area > CLEAR * shared.area:
         return part
-    whole = with_area(shapely.union(roofed_by(part), shared, grid_size=GRID_M))
+    whole = unite([roofed_by(part), shared], GRID_M)
     return leaving_out({**part, "outlines": list_rings(whole)}, new)
 
 
@@ -252,7 +246,7 @@ def leaving_out(part: dict[str, Any], area: shapely.Geometry) -> dict[str, Any]:
     """Return the part without `area`; raises InputError where nothing is left of it."""
     if not roofed_by(part).intersection(area).area > 0.0:
         return part
-    rings = list_rings(shapely.difference(roofed_by(part), area, grid_size=GRID_M))
+    rings = list_rings(subtract(roofed_by(part), area, GRID_M))
     if not rings:
         raise InputError(
             "expected a recess smaller than the part it lies in, got one that covers it; delete "
@@ -268,7 +262,7 @@ def roofed_by(part: dict[str, Any]) -> shapely.Geometry:
     outlines = [
         repair_polygons(polygon(outline, "an outline")) for outline in list_at(part, "outlines")
     ]
-    return with_area(shapely.union_all(outlines, grid_size=GRID_M))
+    return unite(outlines, GRID_M)
 
 
 def cover_rectangle(part: dict[str, Any]) -> shapely.Polygon:

@@ -22,7 +22,7 @@ from ..compose.settle import (
 )
 from ..errors import InputError
 from ..frames import LocalFrame
-from ..geometry.rings import repair_polygons
+from ..geometry.rings import intersect, repair_polygons
 from ..model import Building, Part, Quality, Roof
 from ..primitives.catalogue import CATALOGUE
 from ..primitives.parameters import refuse_no_shape
@@ -203,7 +203,7 @@ def place_plan(uv: np.ndarray, position: np.ndarray, kappa: float) -> shapely.Po
 
 def clip(area: shapely.Polygon, outline: shapely.Polygon) -> list[shapely.Polygon]:
     """Return the polygons that an area covers of an outline."""
-    covered = shapely.intersection(area, repair_polygons(outline), grid_size=1e-4)
+    covered = intersect(area, repair_polygons(outline), 1e-4)
     return [g for g in shapely.get_parts(covered) if g.geom_type == "Polygon"]
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import shapely
 
 from ..errors import FitError
+from ..geometry.rings import unite
 from ..log import count_things
 from ..model import Fit, Part, Piece
 from ..settings import Settings
@@ -94,9 +95,7 @@ def fit_one(
         translation=result.part.translation + shift,
         pieces=tuple(p.move(shift) for p in result.part.pieces),
     )
-    outline = (
-        shapely.union_all([piece.outline for piece in part.pieces]) if outline is None else outline
-    )
+    outline = unite([piece.outline for piece in part.pieces]) if outline is None else outline
     return Fitted((part,), outline, result.value, types)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 
 from ..frames import LocalFrame
-from ..geometry.rings import OVERLAY_GRID_M
+from ..geometry.rings import subtract, unite
 from ..read.plausible import is_plausible
 from ..status import Status
 from .outline import largest_polygon
@@ -52,8 +52,7 @@ def drop_neighbour_roofs(
         return points
     from ..fit.neighbour_roofs import find_neighbour_roofs
 
-    area = shapely.transform(shapely.union_all(neighbours), frame.to_local)
-    area = shapely.difference(area, outline, grid_size=OVERLAY_GRID_M)
+    area = subtract(shapely.transform(unite(neighbours), frame.to_local), outline)
     points_beside = distinct(compress_inside(frame.to_local(finite(surroundings)), area))
     return points[~find_neighbour_roofs(points, outline, points_beside, area)]
 

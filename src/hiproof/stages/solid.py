@@ -10,6 +10,7 @@ import shapely
 
 from ..errors import CompositionError
 from ..geometry.outline_edges import describe_sides, list_outline_edges
+from ..geometry.rings import unite
 from ..model import Building, Footprint, Roof, Solid
 from ..read.plausible import HIGHEST_BUILDING_M
 from ..settings import Settings
@@ -144,7 +145,7 @@ def add_overhangs(
     from ..fit.overhang import find_eaves
 
     frame = building.roof.frame
-    area = shapely.union_all([shapely.transform(n, frame.to_local) for n in neighbours])
+    area = unite([shapely.transform(n, frame.to_local) for n in neighbours])
     eaves, behind_neighbours = find_eaves(
         building, frame.to_local(finite(points)), area, settings.reconstruct
     )

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 import shapely
 
-from ...geometry.rings import OVERLAY_GRID_M
+from ...geometry.rings import OVERLAY_GRID_M, subtract
 from ...model import Part, Piece
 from ...model.heights import find_highest, join_highest, measure_part
 from ...primitives.catalogue import ROUND
@@ -209,9 +209,7 @@ def trim_part(part: Part, plan: shapely.Geometry) -> list[Part]:
     pieces = tuple(
         Piece(polygon, piece.planes)
         for piece in part.pieces
-        for polygon in list_polygons(
-            shapely.difference(piece.outline, plan, grid_size=OVERLAY_GRID_M)
-        )
+        for polygon in list_polygons(subtract(piece.outline, plan))
     )
     left = sum(piece.outline.area for piece in pieces)
     return [part if left <= (1.0 - UNDER_SHARE) * part.area else replace(part, pieces=pieces)]
@@ -226,7 +224,7 @@ def cover_bare_places(
     """
     under, parts = unite_outlines(replaced), [*others, shape]
     roofed = unite_outlines(select_touching(parts, under))
-    bare = shapely.difference(under, roofed, grid_size=OVERLAY_GRID_M)
+    bare = subtract(under, roofed)
     places = make_flat(list_polygons(bare), shape)
     if not places.pieces:
         yield parts
@@ -265,7 +263,7 @@ def lay_base(
     ]
     area = unite_outlines([*group, *replaced, shape])
     if shape.type == "flat":
-        area = shapely.difference(area, plan, grid_size=OVERLAY_GRID_M)
+        area = subtract(area, plan)
     heights = select_heights(roof, shapely.difference(area, plan))
     base = make_flat(list_polygons(area), shape, heights)
     if base.pieces:

@@ -14,7 +14,7 @@ import numpy as np
 import shapely
 from shapely import affinity
 
-from ...geometry.rings import OVERLAY_GRID_M, counterclockwise
+from ...geometry.rings import counterclockwise, intersect, subtract, unite
 from ...model import Part
 from .regions import cut_part, list_polygons
 
@@ -120,7 +120,7 @@ def fit_arc(corners: np.ndarray) -> Arc | None:
 def cut_to_outline(shape: Part, arc: Arc, outline: shapely.Polygon) -> Iterator[Part]:
     """Yield the shape over its plan and up to the arc, as far as the outline reaches."""
     plan = follow_arc(shape.pieces[0].outline, arc)
-    polygons = list_polygons(shapely.intersection(plan, outline, grid_size=OVERLAY_GRID_M))
+    polygons = list_polygons(intersect(plan, outline))
     if polygons:
         yield cut_part(shape, max(polygons, key=lambda polygon: polygon.area))
 
@@ -128,9 +128,9 @@ def cut_to_outline(shape: Part, arc: Arc, outline: shapely.Polygon) -> Iterator[
 def follow_arc(plan: shapely.Polygon, arc: Arc) -> shapely.Geometry:
     """Return a plan over the circle of an arc with its corners."""
     if arc.span_deg >= WHOLE_CIRCLE_DEG or not isinstance(arc.area, shapely.Polygon):
-        return shapely.union(plan, arc.area, grid_size=OVERLAY_GRID_M)
+        return unite([plan, arc.area])
     corners = shapely.get_coordinates(arc.area.exterior)[:-1]
     sector = shapely.make_valid(shapely.Polygon([arc.centre, *corners]))
     beyond = affinity.scale(sector, SECTOR_REACH, SECTOR_REACH, origin=tuple(arc.centre))
-    rest = shapely.difference(plan, beyond, grid_size=OVERLAY_GRID_M)
-    return shapely.union(rest, sector, grid_size=OVERLAY_GRID_M)
+    rest = subtract(plan, beyond)
+    return unite([rest, sector])

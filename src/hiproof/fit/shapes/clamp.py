@@ -10,7 +10,7 @@ import dataclasses
 import numpy as np
 import shapely
 
-from ...geometry.rings import OVERLAY_GRID_M, with_area
+from ...geometry.rings import intersect, subtract, unite, with_area
 from ...model import Part, Piece
 from .regions import list_polygons
 
@@ -52,9 +52,7 @@ def clamp_part(part: Part, z_low: float, z_high: float, missed: float = 0.0) -> 
         sunken = find_excess(pieces, z_low, z_high)[0] if sunken.area > 0.0 else sunken
         beneath += list_polygons(sunken)
         overhead += list_polygons(risen)
-        remainder = shapely.difference(
-            outline, with_area(shapely.union(sunken, risen)), grid_size=OVERLAY_GRID_M
-        )
+        remainder = subtract(outline, with_area(shapely.union(sunken, risen)))
         kept_pieces += [
             Piece(polygon, piece.planes) for polygon in list_polygons(remainder) for piece in pieces
         ]
@@ -76,16 +74,8 @@ def find_excess(
     They have one outline.
     """
     outline, (lowest, highest) = pieces[0].outline, measure_range(pieces)
-    sunken = (
-        shapely.difference(outline, find_above(pieces, z_low), grid_size=OVERLAY_GRID_M)
-        if lowest < z_low
-        else NO_AREA
-    )
-    risen = (
-        shapely.intersection(outline, find_above(pieces, z_high), grid_size=OVERLAY_GRID_M)
-        if highest > z_high
-        else NO_AREA
-    )
+    sunken = subtract(outline, find_above(pieces, z_low)) if lowest < z_low else NO_AREA
+    risen = intersect(outline, find_above(pieces, z_high)) if highest > z_high else NO_AREA
     return with_area(sunken), with_area(risen)
 
 
@@ -106,7 +96,7 @@ def find_above(pieces: list[Piece], z: float) -> shapely.Geometry:
         for a, b, c in piece.planes.tolist():
             ring = clip_ring(ring, a, b, c - z)
         rings.append(shapely.Polygon(ring))
-    return shapely.union_all(rings, grid_size=OVERLAY_GRID_M)
+    return unite(rings)
 
 
 def make_level_part(polygons: list[shapely.Polygon], z: float) -> Part:

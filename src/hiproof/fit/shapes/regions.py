@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import shapely
 
-from ...geometry.rings import OVERLAY_GRID_M, with_area
+from ...geometry.rings import intersect, unite
 from ...model import Part, Piece
 
 # Polygons further apart (m) do not touch after rounding to the grid of overlays.
@@ -24,11 +24,7 @@ def unite_outlines(parts: Iterable[Part]) -> shapely.Geometry:
 
     Lines to which slivers shrink on the grid are left out.
     """
-    return with_area(
-        shapely.union_all(
-            [piece.outline for part in parts for piece in part.pieces], grid_size=OVERLAY_GRID_M
-        )
-    )
+    return unite([piece.outline for part in parts for piece in part.pieces])
 
 
 def select_touching(parts: Iterable[Part], area: shapely.Geometry) -> list[Part]:
@@ -69,7 +65,7 @@ def cut_part(part: Part, outline: shapely.Polygon) -> Part:
         return replace(part, pieces=tuple(Piece(outline, p.planes) for p in part.pieces))
     cut = [
         (
-            list_polygons(shapely.intersection(p.outline, outline, grid_size=OVERLAY_GRID_M)),
+            list_polygons(intersect(p.outline, outline)),
             p.planes,
         )
         for p in part.pieces

@@ -12,7 +12,7 @@ import shapely
 
 from ...compiled import compiled
 from ...geometry.arrays import compute_median
-from ...geometry.rings import OVERLAY_GRID_M
+from ...geometry.rings import intersect
 from ...model import Part
 from ...primitives.cants import list_cants
 from ...primitives.catalogue import CATALOGUE
@@ -110,7 +110,7 @@ def list_top_shapes(
             fitted = fit_followers(around, shape, theta, free, HALF_WIDTH not in free)
             if fitted is not None:
                 ring = fitted.pieces[0].outline
-                common = shapely.intersection(ring, roof.outline, grid_size=OVERLAY_GRID_M)
+                common = intersect(ring, roof.outline)
                 polygons = list_polygons(common)
                 if polygons:
                     yield cut_part(fitted, max(polygons, key=lambda p: p.area)), CIRCLE_NUMBERS

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 import shapely
 
-from ...geometry.rings import OVERLAY_GRID_M
+from ...geometry.rings import intersect, subtract, unite
 from ...model import Part, Piece
 from ...model.heights import find_highest
 from .regions import (
@@ -49,7 +49,7 @@ def absorb_slivers(parts: list[Part], hidden: Part, widest_m2: float) -> list[Pa
     hidden_area = unite_outlines([hidden])
     covered = unite_outlines(select_touching(parts, hidden_area))
     pieces = [list(part.pieces) for part in parts]
-    bare = list_polygons(shapely.difference(hidden_area, covered, grid_size=OVERLAY_GRID_M))
+    bare = list_polygons(subtract(hidden_area, covered))
     bare = [polygon for polygon in bare if not shapely.buffer(polygon, -OVERLAY_GAP_M).is_empty]
     if sum(polygon.area for polygon in bare) > widest_m2:
         return None
@@ -61,13 +61,9 @@ def absorb_slivers(parts: list[Part], hidden: Part, widest_m2: float) -> list[Pa
         if not (pieces and pieces[k]):
             return None  # nothing lies beside the sliver
         outline = pieces[k][q].outline
-        seam = list_polygons(
-            shapely.intersection(wide_sliver, hidden_area, grid_size=OVERLAY_GRID_M)
-        )
+        seam = list_polygons(intersect(wide_sliver, hidden_area))
         snapped = shapely.snap(sliver, outline, OVERLAY_GAP_M)
-        merged = list_polygons(
-            shapely.union_all([outline, *seam, snapped], grid_size=OVERLAY_GRID_M)
-        )
+        merged = list_polygons(unite([outline, *seam, snapped]))
         if len(merged) != 1:
             return None
         pieces[k] = [

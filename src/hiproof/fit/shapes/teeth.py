@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 import shapely
 
-from ...geometry.rings import OVERLAY_GRID_M, with_area
+from ...geometry.rings import intersect, subtract, unite, with_area
 from ...model import Part, Piece
 from ...primitives import get
 from ...primitives.shed import TEETH
@@ -227,9 +227,7 @@ def frame_row(row: list[Part], other_parts: list[Part]) -> RowFrame:
     covered, others_area = (unite_outlines(group) for group in (row, other_parts))
     uv = (shapely.get_coordinates(covered) - origin) @ axes.T
     (left, first), (right, last) = uv.min(axis=0).tolist(), uv.max(axis=0).tolist()
-    roof = shapely.MultiPolygon(
-        list_polygons(shapely.union(covered, others_area, grid_size=OVERLAY_GRID_M))
-    )
+    roof = shapely.MultiPolygon(list_polygons(unite([covered, others_area])))
     walls = shapely.buffer(roof, CRACK_M, join_style="mitre").boundary
     return RowFrame(origin, axes, left, right, first, last, covered, roof, walls)
 
@@ -263,9 +261,7 @@ def make_saw_tooth(row: list[Part], other_parts: list[Part]) -> list[Part] | Non
     shape = get("shed").variant(parameters)
     whole = shape.part(shape.to_theta(parameters, row[0].kappa, translation))
     shed = replace(whole, pieces=cut_teeth(whole.pieces, breaks, ground))
-    remainder = shapely.difference(
-        ground.covered, ground.make_strip(breaks[0], breaks[-1]), grid_size=OVERLAY_GRID_M
-    )
+    remainder = subtract(ground.covered, ground.make_strip(breaks[0], breaks[-1]))
     left_over = replace(
         shed,
         pieces=tuple(Piece(polygon, shed.pieces[0].planes) for polygon in list_polygons(remainder)),
@@ -330,17 +326,11 @@ def cut_teeth(pieces: tuple[Piece, ...], breaks: np.ndarray, ground: RowFrame) -
         ground.make_strip(breaks[0], ground.first),
         ground.make_strip(ground.last, breaks[-1]),
     ]
-    extension = with_area(
-        shapely.intersection(
-            ground.roof, with_area(shapely.union_all(further, grid_size=OVERLAY_GRID_M))
-        )
-    )
-    row_area = with_area(shapely.union(ground.covered, extension, grid_size=OVERLAY_GRID_M))
+    extension = with_area(shapely.intersection(ground.roof, unite(further)))
+    row_area = unite([ground.covered, extension])
     strips = [ground.make_strip(foot, top) for foot, top in pairwise(breaks.tolist())]
     return tuple(
         Piece(polygon, piece.planes)
         for strip, piece in zip(strips, pieces, strict=True)
-        for polygon in list_polygons(
-            shapely.intersection(row_area, strip, grid_size=OVERLAY_GRID_M)
-        )
+        for polygon in list_polygons(intersect(row_area, strip))
     )
