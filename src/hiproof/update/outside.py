@@ -306,8 +306,8 @@ def measure_height(points: np.ndarray, ground: np.ndarray) -> float | None:
     `points` (k, 3) and `ground` (m, 3) are cells; the result is None where no ground is near.
     """
     low, high = (f(points[:, :2], axis=0) for f in (np.min, np.max))
-    off = np.maximum(low - ground[:, :2], ground[:, :2] - high).max(axis=1)
-    heights = ground[off <= GROUND_AROUND_M, 2]
+    low, high = low - GROUND_AROUND_M, high + GROUND_AROUND_M
+    heights = ground[((ground[:, :2] >= low) & (ground[:, :2] <= high)).all(axis=1), 2]
     return float(np.median(points[:, 2]) - np.median(heights)) if len(heights) else None
 
 
