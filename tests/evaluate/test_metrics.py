@@ -15,7 +15,6 @@ from hiproof.city.run import Request, reconstruct_area
 from hiproof.evaluate.metrics import (
     iou,
     nodata_share,
-    percentile,
     plan_outline,
     psd,
     quality,
@@ -143,12 +142,6 @@ def test_cells_are_counted_as_one_by_one(seed):
         np.mean([cell not in gaps_by_cell for cell in cells])
     )
     assert unexplained_area(xyz, dz) == sum(np.mean(gaps) > 0.5 for gaps in gaps_by_cell.values())
-
-
-@pytest.mark.parametrize("count", [1, 2, 3, 20, 21, 400])
-def test_percentiles_are_those_of_numpy(count):
-    values = np.random.default_rng(count).normal(0, 1, count)
-    assert percentile(values, 0.95) == pytest.approx(np.percentile(values, 95), rel=1e-14)
 
 
 def test_figures_do_not_depend_on_the_order_of_points():

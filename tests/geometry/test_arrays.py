@@ -20,7 +20,7 @@ from hiproof.geometry.arrays import (
 from hiproof.geometry.components import label_components
 from hiproof.geometry.grid import cell_range, count_cells, number_cells
 from hiproof.geometry.point_grid import PointGrid
-from hiproof.geometry.point_in_polygon import find_inside, flips
+from hiproof.geometry.point_in_polygon import flips
 from hiproof.geometry.rings import ring_normal, ring_normals
 from hiproof.geometry.thin import rank_in_cells, without_repeats
 from hiproof.model import Footprint
@@ -195,21 +195,6 @@ def test_a_point_is_inside_where_an_odd_number_of_edges_flips(seed):
             flips(*a, *b, x, y) for a, b in zip(ring, np.roll(ring, -1, axis=0), strict=True)
         )
         assert bool(flipped % 2) == shapely.contains_xy(area, x, y)
-
-
-@pytest.mark.parametrize("seed", range(20))
-def test_places_inside_an_area_and_on_its_border_are_found(seed):
-    """Also with holes, in several polygons, and in none."""
-    rng = np.random.default_rng(seed)
-    boxes = shapely.box(*rng.integers(0, 4, (2, 3)), *rng.integers(4, 9, (2, 3)))
-    area = shapely.difference(shapely.union_all(boxes), shapely.box(3, 3, 5, 5 + seed % 3))
-    nodes = np.reshape(np.meshgrid(np.arange(0, 9, 0.5), np.arange(0, 9, 0.5)), (2, -1))
-    turned, chance = shapely.affinity.rotate(area, 10.0 * seed), rng.uniform(0, 9, (2, 300))
-    many = shapely.segmentize(turned, 0.05)
-    cases = (area, nodes), (turned, chance), (many, chance), (shapely.Polygon(), nodes)
-    for polygon, (x, y) in cases:
-        expected = shapely.intersects_xy(polygon, x, y)
-        assert find_inside(polygon, x, y).tolist() == expected.tolist()
 
 
 def test_a_normal_is_as_long_as_its_ring_is_large_and_turns_with_it():

@@ -13,9 +13,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import shapely
 
 from ..errors import InputError
-from ..geometry.point_in_polygon import mark_inside
+from ..geometry.point_in_polygon import find_inside
 from ..geometry.rings import ring_normal
 from ..model import as_xyz
 
@@ -36,7 +37,23 @@ def point_surface_distances(
     >>> point_surface_distances(np.array([[1.0, 1, 3], [5, 1, 4]]), [square]).tolist()
     [3.0, 5.0]
     """
-    return measure_nearest(as_xyz(points), list_polygons(polygons))
+    points = as_xyz(points)
+    nearest = np.full(len(points), np.inf)
+    for rings in list_polygons(polygons):
+        normal, origin, near = *fit_ring_plane(rings[0]), np.arange(len(points))
+        if normal.any():
+            heights = (points - origin) @ normal
+            near = np.flatnonzero(np.abs(heights) < nearest)
+            heights = heights[near]
+            feet = points[near] - heights[:, None] * normal
+            kept = np.arange(3) != np.abs(normal).argmax()
+            inside = contains(rings, kept, feet)
+            nearest[near[inside]] = np.abs(heights[inside])
+            near = near[~inside]
+        for ring in rings:
+            for start, end in zip(ring, np.roll(ring, -1, axis=0), strict=True):
+                nearest[near] = np.minimum(nearest[near], edge_distance(points[near], start, end))
+    return nearest
 
 
 def vertical_distances(points: np.ndarray, polygons: Sequence[Ring | Sequence[Ring]]) -> np.ndarray:
@@ -48,7 +65,17 @@ def vertical_distances(points: np.ndarray, polygons: Sequence[Ring | Sequence[Ri
     >>> vertical_distances(np.array([[1.0, 1, 3], [5, 1, 4]]), [square]).tolist()
     [2.0, inf]
     """
-    return measure_vertically(as_xyz(points), list_polygons(polygons))
+    points = as_xyz(points)
+    nearest = np.full(len(points), np.inf)
+    for rings in list_polygons(polygons):
+        normal, origin = fit_ring_plane(rings[0])
+        if abs(normal[2]) < 1e-6:
+            continue
+        gaps = np.abs((points - origin) @ normal / normal[2])
+        near = np.flatnonzero(gaps < nearest)
+        near = near[contains(rings, np.array([True, True, False]), points[near])]
+        nearest[near] = gaps[near]
+    return nearest
 
 
 def list_polygons(polygons: Sequence[Ring | Sequence[Ring]]) -> list[list[np.ndarray]]:
@@ -66,40 +93,6 @@ def list_polygons(polygons: Sequence[Ring | Sequence[Ring]]) -> list[list[np.nda
     return result
 
 
-def measure_nearest(points: np.ndarray, polygons: list[list[np.ndarray]]) -> np.ndarray:
-    """Return the distance (n,) of each point (n, 3) to the nearest of the polygons."""
-    nearest = np.full(len(points), np.inf)
-    for rings in polygons:
-        normal, origin, near = *fit_ring_plane(rings[0]), np.arange(len(points))
-        if normal.any():
-            heights = (points - origin) @ normal
-            near = np.flatnonzero(np.abs(heights) < nearest)
-            heights = heights[near]
-            feet = points[near] - heights[:, None] * normal
-            kept = np.arange(3) != np.abs(normal).argmax()
-            inside = contains(rings, kept, feet)
-            nearest[near[inside]] = np.abs(heights[inside])
-            near = near[~inside]
-        for ring in rings:
-            for start, end in zip(ring, np.roll(ring, -1, axis=0), strict=True):
-                nearest[near] = np.minimum(nearest[near], edge_distance(points[near], start, end))
-    return nearest
-
-
-def measure_vertically(points: np.ndarray, polygons: list[list[np.ndarray]]) -> np.ndarray:
-    """Return the least height (n,) to polygons over or under points (n, 3), inf without."""
-    nearest = np.full(len(points), np.inf)
-    for rings in polygons:
-        normal, origin = fit_ring_plane(rings[0])
-        if abs(normal[2]) < 1e-6:
-            continue
-        gaps = np.abs((points - origin) @ normal / normal[2])
-        near = np.flatnonzero(gaps < nearest)
-        near = near[contains(rings, np.array([True, True, False]), points[near])]
-        nearest[near] = gaps[near]
-    return nearest
-
-
 def fit_ring_plane(ring: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return unit normal (Newell, zero without area) and centroid of a ring."""
     normal = ring_normal(ring)
@@ -109,10 +102,8 @@ def fit_ring_plane(ring: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def contains(rings: list[np.ndarray], kept: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Return whether points (n, 3) lie in a polygon with holes, seen along the dropped axis."""
-    starts = np.concatenate(rings)[:, kept]
-    ends = np.concatenate([np.roll(ring, -1, axis=0) for ring in rings])[:, kept]
-    x, y = np.ascontiguousarray(points[:, kept].T)
-    return mark_inside(x, y, starts, ends)
+    outer, *holes = (ring[:, kept] for ring in rings)
+    return find_inside(shapely.Polygon(outer, holes), *points[:, kept].T)
 
 
 def edge_distance(points: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:

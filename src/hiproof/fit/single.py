@@ -211,7 +211,7 @@ def usable_points(
             f"{len(points)} given; "
             "a flat roof at their median height is all that can be said"
         )
-    cloud = in_order(cloud)
+    cloud = cloud[np.lexsort(cloud.T[::-1])]
     narrow, wide = plan_extents(cloud[:, :2])
     if narrow <= max(THINNEST * wide, 1e-6):
         shape = "in one place" if wide < 1e-6 else "on one line in plan"
@@ -221,17 +221,6 @@ def usable_points(
             "points beside it"
         )
     return cloud
-
-
-def in_order(cloud: np.ndarray) -> np.ndarray:
-    """Sort rows (n, k) lexicographically, unless they are sorted already.
-
-    Those of a building come so, and looking is cheaper than sorting.
-    """
-    step = np.zeros(len(cloud) - 1)
-    for column in cloud.T:
-        step = np.where(step == 0.0, np.diff(column), step)
-    return cloud if (step >= 0.0).all() else cloud[np.lexsort(cloud.T[::-1])]
 
 
 def as_fit(estimate: Estimate, frame: LocalFrame, points_used: int) -> Fit:

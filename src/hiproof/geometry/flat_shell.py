@@ -117,8 +117,6 @@ def weld(vertices: np.ndarray) -> np.ndarray:
     points = shapely.points(vertices[:, :2])
     pairs = shapely.STRtree(points).query(points, predicate="dwithin", distance=SAME_POINT_M)
     is_same = np.linalg.norm(vertices[pairs[0]] - vertices[pairs[1]], axis=1) < SAME_POINT_M
-    if is_same.sum() == len(vertices):  # each is one with itself alone
-        return np.arange(len(vertices))
     labels = label_components(len(vertices), pairs[:, is_same])
     return np.unique(labels, return_index=True)[1][labels]
 

@@ -6,8 +6,6 @@ import math
 
 import numpy as np
 
-MOST_CELLS_A_POINT = 16  # beyond it sorting is cheaper than a table of all cells
-
 
 def number_cells(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Number the distinct cells among `cells` (n, 2), by column, then by row.
@@ -28,11 +26,7 @@ def number_cells(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     column, row = (cells - low).T
     rows = int(row.max()) + 1
     keys = column * rows + row
-    if keys.max() > MOST_CELLS_A_POINT * len(keys):
-        occupied, number = np.unique(keys, return_inverse=True)
-    else:
-        is_occupied = np.bincount(keys) > 0
-        occupied, number = np.flatnonzero(is_occupied), (np.cumsum(is_occupied) - 1)[keys]
+    occupied, number = np.unique(keys, return_inverse=True)
     return np.column_stack(np.divmod(occupied, rows)) + low, number
 
 

@@ -10,7 +10,6 @@ from .grid import number_cells
 
 # sums and comparisons run on whole tenths of a millimetre: integers do not mind their order
 UNITS_PER_M = 10_000
-MOST_COUNTED = 2**16  # cells: numbers of 16 bits NumPy sorts by counting them
 
 
 def thin_to_grid(xyz: np.ndarray, cell_m: float) -> np.ndarray:
@@ -80,9 +79,6 @@ def rank_in_cells(
     mean = np.column_stack([np.bincount(cell_of, values) for values in units]) / counts[:, None]
     heights = np.rint(xyz[:, 2] * UNITS_PER_M).astype(np.int64)
     lowest, span = heights.min(), int(np.ptp(heights)) + 1
-    order = cell_of * span + (heights - lowest)
-    if len(occupied) <= MOST_COUNTED:  # cell by cell, so that little is left to be sorted
-        order = order[np.argsort(cell_of.astype(np.uint16), kind="stable")]
-    ascending = np.sort(order, kind="stable") % span + lowest
+    ascending = np.sort(cell_of * span + (heights - lowest)) % span + lowest
     selection = np.cumsum(counts) - counts + np.minimum(rank(counts), counts - 1)
     return np.column_stack([corner + mean / UNITS_PER_M, ascending[selection] / UNITS_PER_M])

@@ -93,7 +93,6 @@ class Surroundings:
         self.model = None if model is None else TerrainRecorder(model)
         self.points, self.grid = points, PointGrid(self.roof)
         self.shifts: dict[int, Shift] = {}
-        self.latest: tuple[shapely.Polygon, np.ndarray] = shapely.Polygon(), np.zeros(0, np.int64)
 
     @functools.cached_property
     def settings(self) -> Settings:
@@ -192,13 +191,8 @@ class Surroundings:
         return self.add_outer_points(job, found)
 
     def take_near(self, area: shapely.Polygon) -> np.ndarray:
-        """Take the roof points (n, 3) in an area and around it.
-
-        Of a house alone, the second call for the same area finds the points of the first.
-        """
-        if self.latest[0] is not area:
-            self.latest = area, self.grid.find_within(area, self.plan.around_m)
-        return self.roof.take(self.latest[1], axis=0)
+        """Take the roof points (n, 3) in an area and around it."""
+        return self.roof.take(self.grid.find_within(area, self.plan.around_m), axis=0)
 
     def add_outer_points(self, job: Job, found: FoundRoof) -> FoundRoof:
         """Return the roof with the points beyond a footprint that may show overhangs."""
