@@ -13,7 +13,8 @@ from hiproof import log, masking
 from hiproof.city import run as city_run
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.city.work import solve
-from hiproof.city.work.tasks import WITHOUT_FOOTPRINTS, make_ready
+from hiproof.city.work.tasks import WITHOUT_FOOTPRINTS
+from hiproof.city.work.warm import make_ready
 from hiproof.compiled import news
 from hiproof.garbage import RARELY
 from hiproof.parametric.run import build_file

@@ -14,7 +14,7 @@ from hiproof.compiled import news
 from hiproof.model import Building, Quality
 from hiproof.read.outlines.footprints import read_footprints
 from hiproof.status import Status
-from hiproof.update.tile import update_tile
+from hiproof.update.solve import update_tile
 
 DEADLY = "house-2"
 

@@ -2,17 +2,12 @@
 
 import os
 import signal
-import sys
 
 
 def double(x):
     if x == 3:
         raise ValueError("three")
     return 2 * x
-
-
-def has_imported(module):
-    return module in sys.modules
 
 
 def die_at_second_task(x):

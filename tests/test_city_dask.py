@@ -10,7 +10,6 @@ import pytest
 import planted
 from hiproof.city import run as city_run
 from hiproof.city.run import Request, reconstruct_area
-from hiproof.city.work.tasks import WORK
 from hiproof.errors import InputError, OutputError
 from hiproof.update import run as update_run
 from hiproof.update.request import UpdateRequest
@@ -26,7 +25,9 @@ distributed = pytest.importorskip("distributed", reason="needs dask[distributed]
 def forked_workers():
     """Let Dask fork a dozen workers from one process that has imported what they need."""
     with dask.config.set({"distributed.worker.multiprocessing-method": "forkserver"}):
-        distributed.utils.get_mp_context().set_forkserver_preload([*WORK, "distributed"])
+        distributed.utils.get_mp_context().set_forkserver_preload(
+            ["hiproof.city.work.solve", "hiproof.fit.union", "distributed"]
+        )
         yield
 
 

@@ -27,7 +27,7 @@ from hiproof.city.work.processes import Processes
 from hiproof.city.work.sort import Reach
 from hiproof.city.work.tasks import WorkerLost
 from hiproof.read.terrain import TerrainChain
-from small_tasks import die_at_second_task, double, has_imported
+from small_tasks import die_at_second_task, double
 
 
 def jobs_at(xy):
@@ -211,14 +211,6 @@ def test_executors_return_every_task_with_result_or_error(executor):
     }
     executor.close()
     assert got == {i: ((None, ValueError) if i == 3 else (2 * i, type(None))) for i in range(6)}
-
-
-def test_workers_import_what_tasks_need_before_there_are_tasks():
-    executor = Processes(1)
-    executor.start()
-    ((_, result, error),) = executor.run(has_imported, [("hiproof.city.work.solve",)])
-    executor.close()
-    assert result and error is None
 
 
 def test_workers_have_the_environment_and_the_folder_of_the_moment(tmp_path, monkeypatch):

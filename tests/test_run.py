@@ -4,7 +4,6 @@ way.
 
 import json
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -21,17 +20,16 @@ import planted
 from hiproof import read_parameters
 from hiproof.city import run as city_run
 from hiproof.city.run import Request, reconstruct_area
-from hiproof.city.work.tasks import MAIN_JOB, WITHOUT_FOOTPRINTS, make_ready
+from hiproof.city.work.tasks import WITHOUT_FOOTPRINTS
+from hiproof.city.work.warm import make_ready
 from hiproof.cli.app import app
-from hiproof.compiled import kept
-from hiproof.compiled.stamp import PACKAGE
 from hiproof.compose import check_solid
 from hiproof.errors import InputError
 from hiproof.evaluate.run import evaluate_run
 from hiproof.read.models.solids import read_solids
 from hiproof.settings import Settings
 from layers import write_layer
-from programs import run_hiproof, run_python
+from programs import run_hiproof
 from run_records import RECORDS, records
 from tiny_town import make_town, write_cloud, write_footprints, write_town
 
@@ -204,25 +202,6 @@ def test_two_workers_change_no_byte_and_compile_nothing(finished_run, files, tmp
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_without_compiling)
     reconstruct_area(Request((str(files[0]),), tmp_path, str(files[1]), processes=2))
     assert records(tmp_path) == records(finished_run[0])
-
-
-def test_the_main_process_of_workers_imports_no_compiler(town_files, tmp_path):
-    """Its marks of what is compiled are its own: other tests remove those of another state."""
-    make_ready(MAIN_JOB)
-    *_, place = places = kept.list_folders(PACKAGE)
-    marks = tmp_path / "kept" / place.name
-    marks.mkdir(parents=True)
-    for file in [file for folder in places for file in folder.glob("warm.*")]:
-        shutil.copy(file, marks)
-    code = (
-        "import sys; from hiproof import Request, reconstruct_area\n"
-        "cloud, footprints, out = sys.argv[1:]\n"
-        "summary = reconstruct_area(Request((cloud,), out, footprints, processes=2))\n"
-        "print(summary.overview.headline, 'numba' in sys.modules)"
-    )
-    environment = {"NUMBA_CACHE_DIR": str(tmp_path / "kept"), "PYTHONWARNINGS": "ignore"}
-    printed = run_python(code, *town_files, tmp_path / "out", **environment)
-    assert printed == "4 of 4 buildings modelled False\n"
 
 
 def test_an_interrupted_run_goes_on_and_ends_the_same(finished_run, files, tmp_path, monkeypatch):

@@ -8,7 +8,7 @@ from hiproof.update import before
 from hiproof.update import run as update_run
 from hiproof.update.request import UpdateRequest
 from hiproof.update.run import update_area
-from hiproof.update.tile import update_tile
+from hiproof.update.solve import update_tile
 from run_records import RECORDS
 from tiny_town import make_town, write_cloud
 

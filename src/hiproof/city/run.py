@@ -43,12 +43,9 @@ from .work.bundle_folders import FAILURES_FOLDER, bundles_in, remove_bundles
 from .work.cores import as_many_as_pay
 from .work.executors import make_executor
 from .work.queue import Queue
-from .work.tasks import (
-    MAIN_JOB,
-    WITHOUT_FOOTPRINTS,
-    solve_tile,
-    sort_cloud,
-)
+from .work.solve import solve_tile
+from .work.sort import sort_cloud
+from .work.tasks import MAIN_JOB, WITHOUT_FOOTPRINTS
 
 INPUTS = (
     *("clouds", "footprints", "layer", "id_attribute", "where"),
@@ -142,8 +139,6 @@ def reconstruct_in_folder(
     executor = make_executor(request.processes or 1, request.scheduler)
     ledger = open_ledger(state, request.restart)
     try:
-        if ledger.get("merged") != "yes":
-            executor.start()
         plan = resume_or_plan(request, state, ledger, progress, steps.make_plan)
         if request.processes is None and not request.scheduler:
             executor = make_executor(count_processes(request, ledger))

@@ -12,7 +12,8 @@ def warm(*, everything: bool = False) -> None:
 
     This takes a minute or two, once for each version.
     """
-    from ..city.work.tasks import MAIN_JOB, WITHOUT_FOOTPRINTS, make_ready
+    from ..city.work.tasks import MAIN_JOB, WITHOUT_FOOTPRINTS
+    from ..city.work.warm import make_ready
 
     with show_progress("compile"):
         make_ready(WITHOUT_FOOTPRINTS if everything else MAIN_JOB)

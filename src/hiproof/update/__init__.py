@@ -23,7 +23,6 @@ texts      texts of unchanged buildings, taken from the earlier run
 epochs     the surveys, and the points of both in a work tile
 refine     parameters of unchanged buildings, estimated by the points of both surveys
 solve      a work tile brought up to date
-tile       that, by name, for processes that have imported nothing yet
 several    a run of several surveys: these registered, and its tiles solved
 best       the best survey of each building, and the model made of it
 run        the steps above, one after the other

@@ -22,14 +22,22 @@ from ..evaluate.inputs import RunSurvey
 from ..log import LOGGER
 from ..parametric.record import read_building
 from .earlier import EarlierRun
-from .epochs import JUDGING_FILE, SURVEYS_FILE, Epochs, Surveys, compare_ground, save_shifts
+from .epochs import (
+    JUDGING_FILE,
+    SURVEYS_FILE,
+    Epochs,
+    Surveys,
+    compare_ground,
+    save_shifts,
+    sort_epoch,
+)
 from .members import load_members
-from .outside import save_roofs_outside
+from .outside import save_roofs_outside, sort_survey
 from .plan import EARLIER_FOLDER, save_earlier_plan
 from .register import SampledRoof, draw_buildings, register_surveys
 from .request import WHOLE_CITY, UpdateRequest
+from .solve import judge_tile
 from .texts import find_texts
-from .tile import judge_tile, sort_earlier_cloud
 
 
 def find_largest_chance(chances: np.ndarray, significance: float) -> float:
@@ -131,6 +139,17 @@ def sort_earlier(surveys: tuple[RunSurvey, ...], folder: Path, executor: Any) ->
                 f"expected to read {task[2]}, of which the earlier run was made, got: {error}; "
                 "restore it, or move all of the run's clouds away to compare with its models alone"
             ) from error
+
+
+def sort_earlier_cloud(epochs: tuple[str, ...], folder: str, number: int, address: str) -> dict:
+    """Sort a point file of the earlier run, file `number` of those in `epochs`.
+
+    The newest survey comes first, and is the one whose roofs and ground the new survey is compared
+    with.
+    """
+    if epochs[number] == epochs[0]:
+        return sort_survey(folder, number, address, epochs[0])
+    return sort_epoch(epochs, folder, number, address)
 
 
 def draw_samples(state: Path, plan: WorkPlan, terrain: str | None) -> Iterator[SampledRoof]:

@@ -16,7 +16,7 @@ from ..city.work.found import FoundRoof
 from ..city.work.ground import BareAround
 from ..city.work.other_classes import find_bare_cells, find_low_cells
 from ..city.work.solve import Surroundings, open_terrain
-from ..city.work.sort import load_points
+from ..city.work.sort import load_points, sort_cloud
 from ..city.work.surveys import SurveyPoints
 from ..geometry.thin import without_repeats
 from ..parametric.record import read_terrain_lines
@@ -111,6 +111,14 @@ def load_earlier(folder: Path, tile: str) -> SurveyPoints | None:
     record = json.loads((folder / SHIFTS_FILE).read_text(encoding="utf-8"))
     shifts = {name: np.array(shift) for name, shift in record.items()}
     return SurveyPoints.load(folder, tile, None, shifts, load_plan(folder))
+
+
+def sort_epoch(epochs: tuple[str, ...], folder: str, number: int, address: str) -> dict:
+    """Sort a point file of a run of several surveys.
+
+    It is file `number` of those in `epochs`.
+    """
+    return sort_cloud(folder, number, address, epoch=epochs[number])
 
 
 def select_points(surroundings: Surroundings, job: Job) -> np.ndarray:

@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 import shapely
 
-from ..city.plan.work_plan import WorkPlan
+from ..city.plan.work_plan import WorkPlan, load_plan
+from ..city.work.sort import sort_cloud
 from ..geometry.components import label_components
 from ..geometry.grid import number_cells
 from ..model import PointCloud
@@ -93,6 +94,17 @@ class SurveyCells:
             arrays["bounds"] = [x.min(), y.min(), x.max(), y.max()]
         with atomic_file(path) as file:
             np.savez(file, **arrays)
+
+
+def sort_survey(folder: str, number: int, address: str, epoch: str = "") -> dict:
+    """Sort a point file of a survey, and keep where its roofs and its ground lie.
+
+    `epoch` is the name of the survey where it is one of several.
+    """
+    cells = SurveyCells(load_plan(Path(folder)).settings.read)
+    result = sort_cloud(folder, number, address, cells.add, epoch)
+    cells.save(Path(folder) / CELLS_FOLDER / f"{number}.npz")
+    return result
 
 
 def average_cells(

@@ -30,10 +30,10 @@ from .change_tables import write_changes
 from .dates import find_survey_date
 from .earlier import choose_read_settings, read_earlier
 from .epochs import SURVEYS_FILE, Surveys
-from .outside import CELLS_FOLDER, load_roofs_outside
+from .outside import CELLS_FOLDER, load_roofs_outside, sort_survey
 from .plan import make_update_plan
 from .request import EACH_BUILDING, WHOLE_CITY, UpdateRequest
-from .tile import sort_survey, update_tile
+from .solve import update_tile
 
 MANY_CHANGED = 8
 """Buildings that have to count as changed for a warning that most do."""

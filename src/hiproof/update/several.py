@@ -25,10 +25,9 @@ from ..city.work.sort import load_points
 from ..errors import InputError
 from ..garbage import collect_rarely
 from ..write.files import save_text
-from .best import EPOCHS_FILE, load_shifts
-from .epochs import compare_ground, find_ground, select_roof
+from .best import EPOCHS_FILE, load_shifts, solve_best_tile
+from .epochs import compare_ground, find_ground, select_roof, sort_epoch
 from .register import SampledRoof, SurveyShift, draw_buildings, register_surveys
-from .tile import solve_best_tile, sort_epoch
 
 
 def reconstruct_epochs(request: Request, progress: Progress = lambda *_: None) -> Summary:

@@ -4,12 +4,11 @@ It is this process, processes of this machine (processes.py), or a Dask cluster.
 
 One verb: `run`.
 
-`start()` may come early: workers import while the main process plans. `prepare(pieces)` comes
-first: compiled code is made before the work starts, so that no two workers make the same.
-`run(function, tasks)` yields (task, result, error) as tasks finish, in any order. A worker that
-dies does not end the run: its tasks come back with a `WorkerLost`, and the caller decides whether
-to try them again. `isolated()` is an executor whose worker's death harms nobody else. Tasks are
-taken from their iterable only when a worker is near.
+`prepare(pieces)` comes first: compiled code is made before the work starts, so that no two workers
+make the same. `run(function, tasks)` yields (task, result, error) as tasks finish, in any order. A
+worker that dies does not end the run: its tasks come back with a `WorkerLost`, and the caller
+decides whether to try them again. `isolated()` is an executor whose worker's death harms nobody
+else. Tasks are taken from their iterable only when a worker is near.
 """
 
 from __future__ import annotations
@@ -19,17 +18,16 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import CancelledError
 from contextlib import suppress
 from queue import Empty, SimpleQueue
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 from urllib.parse import urlsplit
 
 from ...compiled import news
 from ...compiled.stamp import count_compiled
 from ...errors import InputError, OutputError, raise_interrupt
 from ...extras import import_extra
-from .tasks import TaskOutcome, WorkerLost, make_ready
-
-if TYPE_CHECKING:
-    from .processes import Processes
+from .processes import Processes
+from .tasks import TaskOutcome, WorkerLost
+from .warm import make_ready
 
 CONNECT_S = 20  # seconds for an answer of the scheduler
 # seconds without a worker until a run gives up; seconds between looks at what is done
@@ -38,9 +36,6 @@ WORKERLESS_S, POLL_S = 300, 5
 
 class InProcess:
     """One task after the other in this process."""
-
-    def start(self) -> None:
-        pass
 
     def prepare(self, pieces: Sequence[str]) -> None:
         make_ready(pieces)
@@ -54,7 +49,7 @@ class InProcess:
                 yield task, None, error
 
     def isolate(self) -> Executor:
-        return make_processes(1)
+        return Processes(1)
 
     def close(self) -> None:
         pass
@@ -75,9 +70,6 @@ class Dask:
             raise InputError(
                 f"expected a Dask scheduler at {address}, got: {error}; check the address"
             ) from error
-
-    def start(self) -> None:
-        pass
 
     def prepare(self, pieces: Sequence[str]) -> None:
         """Compile in one worker of each host, then load in the others.
@@ -164,7 +156,7 @@ class Dask:
         self.client.close()
 
 
-Executor: TypeAlias = "InProcess | Processes | Dask"
+Executor: TypeAlias = InProcess | Processes | Dask
 
 
 def import_distributed() -> Any:
@@ -176,14 +168,4 @@ def make_executor(processes: int, scheduler: str | None = None) -> Executor:
     """Make the executor of the options."""
     if scheduler:
         return Dask(scheduler)
-    return make_processes(processes) if processes > 1 else InProcess()
-
-
-def make_processes(count: int) -> Processes:
-    """Make the executor of `count` processes.
-
-    What starts them is imported only then.
-    """
-    from .processes import Processes
-
-    return Processes(count)
+    return Processes(processes) if processes > 1 else InProcess()

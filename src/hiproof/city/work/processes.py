@@ -22,7 +22,8 @@ from ...errors import NotKeptWarning
 from ...garbage import RARELY
 from . import solved
 from .cores import limit_threads
-from .tasks import TaskOutcome, WorkerLost, import_work, is_ready, make_ready
+from .tasks import TaskOutcome, WorkerLost
+from .warm import make_ready
 
 MOST_ON_WINDOWS = 61  # processes that one can wait for there
 COUNT_S = 0.5  # seconds between looks at how many buildings the workers of this machine have solved
@@ -41,19 +42,9 @@ class Processes:
         self.count_solved = RawValue("q", 0)  # by all workers, shared with them
         self.told = 0
 
-    def start(self) -> None:
-        """Start the workers, which import what tasks need."""
-        for _ in range(self.count):
-            self.submit(import_work, ())
-
     def prepare(self, pieces: Sequence[str]) -> None:
-        """Compile what no run compiled before.
-
-        A worker looks, so that this process imports the compiler only if it is needed.
-        """
-        answer = self.submit(is_ready, (pieces,))
-        if answer.exception() or not answer.result():
-            make_ready(pieces)
+        """Compile what no run compiled before."""
+        make_ready(pieces)
 
     def run(self, function: Callable, tasks: Iterable[tuple]) -> Iterator[TaskOutcome]:
         waiting = iter(tasks)
