@@ -17,6 +17,7 @@ from hiproof.city.request import Request
 from hiproof.city.run import reconstruct_area
 from hiproof.cli.app import app
 from hiproof.edit.points import RunPoints
+from hiproof.errors import InputWarning
 from hiproof.evaluate.run import evaluate_run
 from hiproof.parametric.building import build
 from hiproof.parametric.run import build_file
@@ -109,6 +110,20 @@ def test_the_raised_house_differs_in_its_height_alone(update, run):
         assert {**after, "position": 0, "sigma": 0} == {**before, "position": 0, "sigma": 0}
     assert new["residuals"]["rmse"] == pytest.approx(old["residuals"]["rmse"], rel=0.3)
     assert new["change"]["lineage"] == [0]
+
+
+@pytest.mark.parametrize("rise", [0.5, -1.0])
+def test_a_house_on_ground_that_moved_with_it_stands_on_the_new_ground(run, rise, tmp_path):
+    town = make_town(seed=7)
+    west, _, east, _ = town.footprints["house-1"].bounds
+    around = (town.xyz[:, 0] > west - 8) & (town.xyz[:, 0] < east + 8)
+    town.xyz[around, 2] += rise
+    cloud = str(write_cloud(tmp_path / "later.laz", town.xyz, town.classification))
+    with pytest.warns(InputWarning, match="lie elsewhere together with the ground"):
+        update_area(make_request(run, cloud, tmp_path / "out"))
+    before, after = by_id(run)["house-1"], by_id(tmp_path / "out")["house-1"]
+    assert after["change"]["places"][0]["kind"] in ("roof_raised", "roof_lowered")
+    assert after["z_ground"] - before["z_ground"] == pytest.approx(rise, abs=0.03)
 
 
 def test_a_raised_house_with_a_block_on_it_is_no_longer_of_the_earlier_shape(run, tmp_path):

@@ -37,7 +37,7 @@ from ..status import Change, ChangeKind, Doubt, Status
 from ..write.fragments import Fragments
 from ..write.run_files import fragments
 from .cells import SAME_SIGMAS
-from .epochs import JUDGING_FILE, SURVEYS_FILE, Epochs, Surveys, select_roof
+from .epochs import JUDGING_FILE, SURVEYS_FILE, Epochs, Surveys, compare_ground, select_roof
 from .ground import Ground
 from .judge import ChangeVerdict, judge_building
 from .kinds import Difference, name_differences, name_doubts
@@ -64,6 +64,9 @@ TESTED = (Change.CHANGED, Change.UNCHANGED, Change.UNCERTAIN, Change.GONE)
 UNDIVIDED = (Change.GONE, Change.NOT_COVERED)  # classes that hold for all parts of a building
 
 SHIFT_DIGITS = 3  # of footprints: millimetres
+
+GROUND_MOVED_M = 0.25
+"""Height (m) by which the ground around a building moved rather than grass grew on it."""
 
 BARE_SHARE = 0.5
 """Share of an outline that has to lie bare before, for a building to be built since."""
@@ -269,9 +272,14 @@ class Updater:
     ) -> Building | None:
         """Return the earlier building with moved parts.
 
-        None where that does not explain the new points, or where an override holds.
+        None where that does not explain the new points, where the ground moved, too, or where an
+        override holds.
         """
         if job.index in self.overrides or member.record is None:
+            return None
+        before = self.epochs.find_ground(job, member.record)
+        rises = compare_ground(before, self.epochs.new, job)[:, 2]
+        if len(rises) and abs(float(np.median(rises))) > GROUND_MOVED_M:
             return None
         old, new = self.epochs.select(job, member.record)
         to_local = earlier.roof.frame.to_local
