@@ -237,9 +237,11 @@ def test_a_raster_without_a_crs_counts_as_the_cloud_does(tmp_path):
     assert model.height_at(0.3048 * PLACE)[0] == pytest.approx(0.3048 * height(PLACE)[0])
 
 
-@pytest.mark.parametrize("code", [0.0, -99.0, 255.0, -9999.0])
-def test_codes_far_from_all_other_heights_are_none(tmp_path, code):
-    heights = np.full((SIDE, SIDE), 40.0) + np.arange(SIDE)[:, None] / 10
+@pytest.mark.parametrize(
+    "lowest, code", [(2.0, 0.0), (40.0, 0.0), (40.0, -99.0), (40.0, 255.0), (40.0, -9999.0)]
+)
+def test_codes_far_from_all_other_heights_are_none(tmp_path, lowest, code):
+    heights = np.full((SIDE, SIDE), lowest) + np.arange(SIDE)[:, None] / 10
     heights[:, :20] = code
     model = read_terrain(write(tmp_path / "dtm.tif", heights))
     xy = np.array([[WEST + 5, NORTH - 5], [WEST + 30, NORTH - 5]])

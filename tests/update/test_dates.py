@@ -91,7 +91,7 @@ def test_a_named_day_is_bounded(write):
     with pytest.raises(InputError, match="from 1990 on"):
         find_survey_date(clouds, "1989-12-31")
     ahead = (datetime.date.today() + datetime.timedelta(days=400)).isoformat()
-    with pytest.warns(UserWarning, match="in the future; check --date"):
+    with pytest.warns(UserWarning, match="in the future; check its day"):
         assert find_survey_date(clouds, ahead) == ahead
 
 

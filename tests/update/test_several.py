@@ -11,6 +11,7 @@ from click.testing import CliRunner
 from hiproof import InputError, SettingsError
 from hiproof.cli.app import app
 from hiproof.edit.points import RunPoints
+from hiproof.errors import InputWarning
 from hiproof.evaluate.run import evaluate_run
 from hiproof.parametric.run import build_file
 from hiproof.update.dates import choose_clouds
@@ -145,7 +146,9 @@ def test_the_same_call_again_keeps_what_is_done(houses, surveys):
 def test_bad_surveys_are_refused_in_a_sentence(surveys, tmp_path):
     first = f"2014={surveys / '2014'}"
     cases = [
-        ([first, first], "every --epoch once, got 2014 2 times"),
+        ([first, first], "every --epoch once, got 2014 and 2014"),
+        (["2014-05-01=a", first], "every --epoch once, got 2014 and 2014-05-01"),
+        (["1014=a", first], "got '1014=a'; name each survey by its year or day, from 1990 on"),
         ([first, f"2020={surveys / '2014'}"], "other clouds in each --epoch"),
         ([first, f"later={surveys / '2014'}"], "name each survey by its year or day"),
         ([first, "2020="], "name each survey by its year or day"),
@@ -156,6 +159,8 @@ def test_bad_surveys_are_refused_in_a_sentence(surveys, tmp_path):
             choose_clouds((), epochs)
     with pytest.raises(InputError, match="expected clouds or --epoch"):
         choose_clouds(("tile.laz",), [first])
+    with pytest.warns(InputWarning, match="of 2914-01-01 is dated in the future"):
+        choose_clouds((), [first, f"2914={surveys / '2020-05-01'}"])
 
 
 def test_a_shift_without_surveys_is_refused(surveys, tmp_path):

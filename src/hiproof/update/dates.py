@@ -8,10 +8,10 @@ can have been made are used. A run of several surveys names them:
 from __future__ import annotations
 
 import datetime
+import itertools
 import re
 import struct
 import warnings
-from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -85,9 +85,9 @@ def read_date(text: str) -> str:
             f"expected a date as --date 2014-02-09, got {text!r:.40}; write year, month and day"
         ) from error
     if date < FIRST_DAY:
-        raise InputError(f"expected a survey from 1990 on, got {date}; check --date")
+        raise InputError(f"expected a survey from 1990 on, got {date}; check its day")
     if date > datetime.date.today():
-        warnings.warn(f"the survey of {date} is dated in the future; check --date", InputWarning)
+        warnings.warn(f"the survey of {date} is dated in the future; check its day", InputWarning)
     return date.isoformat()
 
 
@@ -182,18 +182,17 @@ def read_epochs(texts: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]
     Traceback (most recent call last):
     ...
     hiproof.errors.InputError: expected --epoch 2014=FOLDER, or --epoch 2014-05-01=FOLDER, got \
-'first=a/'; name each survey by its year or day
+'first=a/'; name each survey by its year or day, from 1990 on
     """
-    pairs = [read_epoch(text) for text in texts]
-    counts = Counter(name for name, _ in pairs)
-    name, count = counts.most_common(1)[0]
-    if count > 1:
-        raise InputError(
-            f"expected every --epoch once, got {name} {count} times; put its clouds into one "
-            "folder, or name surveys by their day"
-        )
+    pairs = sorted(read_epoch(text) for text in texts)
+    for (earlier, _), (later, _) in itertools.pairwise(pairs):
+        if later.startswith(earlier):
+            raise InputError(
+                f"expected every --epoch once, got {earlier} and {later}; put its clouds into one "
+                "folder, or name surveys by their day"
+            )
     clouds: dict[str, str] = {}
-    for name, path in sorted(pairs, reverse=True):
+    for name, path in reversed(pairs):
         for cloud in map(str, expand_paths((path,))):
             if cloud in clouds:
                 raise InputError(
@@ -208,9 +207,12 @@ def read_epoch(text: str) -> tuple[str, str]:
     """Read one survey: its name, and the path of its clouds."""
     name, _, path = text.partition("=")
     try:
-        is_name = bool(re.fullmatch(r"[12]\d{3}", name)) or read_date(name) == name
+        day = f"{name}-01-01" if re.fullmatch(r"\d{4}", name) else name
+        is_name = read_date(day) == day
     except InputError:
         is_name = False
     if not is_name or not path:
-        raise InputError(f"expected {FORM}, got {text!r:.60}; name each survey by its year or day")
+        raise InputError(
+            f"expected {FORM}, got {text!r:.60}; name each survey by its year or day, from 1990 on"
+        )
     return name, path

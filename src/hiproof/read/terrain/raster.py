@@ -63,7 +63,7 @@ NODATA_CODES = (
 
 # Distance (m) from all other heights that makes one of CODES no height: ground has steps of that
 # size, but no ground between them is rare.
-ISOLATED_M = 5.0
+ISOLATED_M = 1.5
 
 FEWEST_CODED = 4  # pixels with such a value, below which it is chance
 
