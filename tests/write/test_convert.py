@@ -16,7 +16,7 @@ from lxml import etree
 
 import hiproof
 from hiproof.cli.convert import convert
-from hiproof.errors import InputError
+from hiproof.errors import InputError, InputWarning
 from hiproof.formats import CONVERTED, FORMATS
 from hiproof.parametric.run import build_file
 from hiproof.read.models.solids import read_solids
@@ -366,6 +366,13 @@ def test_attributes_of_a_file_are_kept_as_they_stand(outputs, tmp_path):
     assert {id: o["attributes"] for id, o in after.items()} == {
         id: o["attributes"] for id, o in before.items()
     }
+
+
+def test_a_file_that_holds_a_building_twice_is_told(run, outputs, tmp_path):
+    lines = outputs("cityjsonseq").read_text().splitlines(keepends=True)
+    (tmp_path / "joined.city.jsonl").write_text("".join([*lines, *lines[1:3]]))
+    with pytest.warns(InputWarning, match="2 buildings with the id of an earlier one"):
+        convert(tmp_path / "joined.city.jsonl", tmp_path / "joined.gml")
 
 
 def test_a_building_that_cannot_be_built_is_left_out(run, tmp_path, caplog):

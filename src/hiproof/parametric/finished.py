@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import warnings
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,13 +14,15 @@ from typing import Any
 import numpy as np
 import shapely
 
-from ..errors import HiproofError, InputError
+from ..errors import HiproofError, InputError, InputWarning
 from ..evaluate.metrics import plan_outline
 from ..evaluate.models import BuildingModel, read_models, run_models
 from ..evaluate.run import run_crs, run_record
 from ..formats import FORMATS
 from ..frames import LocalFrame
 from ..geometry.rings import repair_polygons, ring_normal, ring_normals
+from ..log import count_things
+from ..masking import mask
 from ..model import GROUND, ROOF, WALL, Building, Face, Model, Part, Piece, Roof, Solid
 from ..read.crs import find_units, parse_crs, read_named_crs
 from ..read.models.cityjson import documents, reference_system
@@ -127,10 +131,15 @@ def describe_parametric(path: Path, head: FileHead, damaged: Damaged) -> Iterato
 
 
 def describe_solids(path: Path, head: FileHead, damaged: Damaged) -> Iterator[Described]:
-    """Yield the buildings of a file of solids, with the attributes that stand there."""
+    """Yield the buildings of a file of solids, with the attributes that stand there.
+
+    Those with the id of an earlier one are counted in a warning: a file may be joined of others.
+    """
+    known: Counter[str] = Counter()
     for model in read_solid_models(path, head, damaged):
         if model.is_damaged:
             continue
+        known[model.id] += 1
         try:
             building = make_building(model)
             figures = measure_figures(building)
@@ -138,6 +147,12 @@ def describe_solids(path: Path, head: FileHead, damaged: Damaged) -> Iterator[De
             damaged(InputError(f"expected a solid of {model.id:.80} in {path}, got: {error}"))
             continue
         yield Described(building, figures, building.attributes)
+    if repeats := known.total() - len(known):
+        warnings.warn(
+            f"{mask(str(path))}: {count_things(repeats, 'building')} with the id of an earlier one; "
+            "if it was joined of files that overlap, keep one of each",
+            InputWarning,
+        )
 
 
 def read_solid_models(path: Path, head: FileHead, damaged: Damaged) -> Iterator[BuildingModel]:

@@ -122,7 +122,7 @@ class FileUnits:
         from ..read.crs import find_named_units, find_units, horizontal_crs, parse_crs
         from .reprojected import choose_file_crs, make_reprojection
 
-        world_units = world_units or find_units(parse_crs(crs))
+        world_units = world_units or find_units(parse_crs(crs), "the models")
         there = parse_crs(choose_file_crs(crs, out_crs) if out_crs else crs)
         plan = world_units if there is None else find_units(horizontal_crs(there))
         other = find_units(there) if out_crs else world_units
