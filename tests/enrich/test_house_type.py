@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from hiproof.enrich.answer import answer, count_storeys, measure_floors, storey_heights
 from hiproof.enrich.run import enrich_run
-from hiproof.errors import InputError
+from hiproof.errors import InputError, InputWarning
 from hiproof.parametric.building import build
 from hiproof.settings import EnrichSettings
 from hiproof.write.attribute_list import OWN, TABLES
@@ -166,4 +166,12 @@ def test_a_use_that_no_building_has_is_refused(tmp_path):
     folder = write_street(tmp_path, [place_house("a", 0, 0, use="office"), place_house("b", 9, 0)])
     with pytest.raises(InputError, match=r"of the buildings \(use\) as --use-attribute, got 'uze'"):
         enrich_run(folder, settings=EnrichSettings(use_attribute="uze"))
+    with pytest.warns(InputWarning, match="use: expected words such as residential.*, but office"):
+        enrich_run(folder, settings=EnrichSettings(use_attribute="use"), processes=1)
+
+
+def test_uses_of_which_some_are_known_get_no_warning(tmp_path, recwarn):
+    houses = [place_house("a", 0, 0, use="31001_1000"), place_house("b", 30, 0, use="Wohnhaus")]
+    folder = write_street(tmp_path, houses)
     enrich_run(folder, settings=EnrichSettings(use_attribute="use"), processes=1)
+    assert not recwarn.list

@@ -36,7 +36,8 @@ class Index(NamedTuple):
 
     `offsets` (n,) are their places in the file in bytes, `boxes` (n, 4) those of their outlines in
     plan, `modelled` (n,) whether they have a model. `gml_names` has the names of those in `renamed`
-    whose gml:id another building has taken. `attributes` are the names of all attributes.
+    whose gml:id another building has taken. `attributes` are the names of all attributes, `uses`
+    the uses that buildings have.
     """
 
     offsets: np.ndarray
@@ -45,13 +46,18 @@ class Index(NamedTuple):
     renamed: np.ndarray
     gml_names: np.ndarray
     attributes: np.ndarray
+    uses: np.ndarray
 
 
-def index_records(path: Path) -> Index:
-    """Read the index of a parameters.jsonl; InputError for broken lines and repeated ids."""
+def index_records(path: Path, use_attribute: str = "") -> Index:
+    """Read the index of a parameters.jsonl; InputError for broken lines and repeated ids.
+
+    `use_attribute` is the one that has the use of a building, "" where none has.
+    """
     offsets, boxes, modelled = array("q"), array("d"), array("b")
     ids: set[str] = set()
     attributes: dict[str, None] = {}
+    uses: dict[str, None] = {}
     names, renamed = UniqueNames(), {}
     with path.open("rb") as file:
         file.readline()
@@ -68,6 +74,7 @@ def index_records(path: Path) -> Index:
                 ids.add(id)
                 if isinstance(record.get("attributes"), dict):
                     attributes.update(dict.fromkeys(record["attributes"]))
+                    uses[str(record["attributes"].get(use_attribute) or "")] = None
                 name = names.take(gml_name(record["id"]))
                 if name != gml_name(record["id"]):
                     renamed[len(offsets)] = name
@@ -82,6 +89,7 @@ def index_records(path: Path) -> Index:
         np.array(list(renamed), np.int64),
         np.array(list(renamed.values()), str),
         np.array(list(attributes), str),
+        np.array(list(uses), str),
     )
 
 

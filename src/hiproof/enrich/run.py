@@ -12,6 +12,7 @@ import functools
 import hashlib
 import json
 import shutil
+import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -22,7 +23,7 @@ from .. import __version__
 from ..city.plan.checks import refuse_missing_use
 from ..city.work.cores import as_many_as_pay
 from ..city.work.executors import make_executor
-from ..errors import HiproofError, InputError, OutputError, report_error
+from ..errors import HiproofError, InputError, InputWarning, OutputError, report_error
 from ..evaluate.run import list_run_inputs, run_record
 from ..formats import FORMATS, import_format, list_requested_files, requested_fragments
 from ..log import LOGGER
@@ -38,7 +39,7 @@ from ..write.fragments import Fragment, Fragments, Sheet, load_fragments, save_f
 from ..write.head import FileHead
 from ..write.run_files import join_fragments
 from ..write.values import plain_text
-from .answer import Answers, answer
+from .answer import Answers, answer, is_residential
 from .cadastre import Cadastre, refuse_unfit, refuse_unusable
 from .energy import refuse_other_citygml, write_energy
 from .party import Town
@@ -163,9 +164,10 @@ def enrich_run(
             f"expected the output folder of `hiproof reconstruct`, got no {parameters}; check the "
             "path"
         )
-    index = index_records(parameters)
+    index = index_records(parameters, settings.use_attribute)
     if len(index.offsets):
         refuse_missing_use(index.attributes, settings.use_attribute)
+        warn_without_residential(index.uses, settings.use_attribute)
     records = Records(parameters, index)
     refuse_unfit(records, settings)
     requested = Settings(write=records.head.write, enrich=settings)
@@ -195,6 +197,17 @@ def enrich_run(
     write_record(parameters.parent, out, settings, result)
     shutil.rmtree(waiting.parent, ignore_errors=True)
     return result
+
+
+def warn_without_residential(uses: np.ndarray, name: str) -> None:
+    """Warn where none of the `uses` (n,) is a dwelling's, as where they are codes."""
+    named = [str(use) for use in uses if use]
+    if named and not any(map(is_residential, named)):
+        warnings.warn(
+            f"{name}: expected words such as residential, Wohnhaus or woonfunctie, got none, but "
+            f"{named[0]:.40}; buildings with a use get no house type, and storeys as in offices",
+            InputWarning,
+        )
 
 
 def make_waiting_folder(out: Path, parameters: Path, settings: EnrichSettings) -> Path:
