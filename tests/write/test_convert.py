@@ -371,7 +371,7 @@ def test_attributes_of_a_file_are_kept_as_they_stand(outputs, tmp_path):
 def test_a_file_that_holds_a_building_twice_is_told(run, outputs, tmp_path):
     lines = outputs("cityjsonseq").read_text().splitlines(keepends=True)
     (tmp_path / "joined.city.jsonl").write_text("".join([*lines, *lines[1:3]]))
-    with pytest.warns(InputWarning, match="2 buildings with the id of an earlier one"):
+    with pytest.warns(InputWarning, match="2 buildings with an id given before"):
         convert(tmp_path / "joined.city.jsonl", tmp_path / "joined.gml")
 
 

@@ -149,7 +149,7 @@ def describe_solids(path: Path, head: FileHead, damaged: Damaged) -> Iterator[De
         yield Described(building, figures, building.attributes)
     if repeats := known.total() - len(known):
         warnings.warn(
-            f"{mask(str(path))}: {count_things(repeats, 'building')} with the id of an earlier one; "
+            f"{mask(str(path))}: {count_things(repeats, 'building')} with an id given before; "
             "if it was joined of files that overlap, keep one of each",
             InputWarning,
         )
