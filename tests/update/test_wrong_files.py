@@ -9,6 +9,7 @@ import shapely
 
 from hiproof.city.request import Request
 from hiproof.city.run import reconstruct_area
+from hiproof.errors import InputError
 from hiproof.update.request import UpdateRequest
 from hiproof.update.run import update_area
 from tiny_town import make_town, write_cloud, write_footprints
@@ -70,11 +71,21 @@ def test_outlines_with_the_ids_of_other_buildings_are_told(run, way, tmp_path):
     assert f" of {HOUSES} footprints lie on another building than the one with their id" in text
 
 
-@pytest.mark.parametrize("aside", [(1.5, 0.0, 0.0), (0.0, 0.0, 43.0), (-2.0, 2.0, 0.3)])
+@pytest.mark.parametrize("aside", [(1.5, 0.0, 0.0), (0.0, 0.0, 4.0), (-2.0, 2.0, 0.3)])
 def test_where_most_buildings_count_as_changed_the_shift_is_doubted(run, aside, tmp_path):
     texts, classes = update(run, tmp_path / "out", write_later(tmp_path, aside))
     assert classes["changed"] >= 8
     assert any("count as changed, more than a town has" in text for text in texts)
+
+
+@pytest.mark.parametrize("off_m", [43.0, -43.0])
+def test_heights_of_another_system_are_refused(run, off_m, tmp_path):
+    """Below the earlier ground all houses were gone, above it all were raised."""
+    cloud = write_later(tmp_path, (0.0, 0.0, off_m))
+    with pytest.raises(InputError, match="its heights seem to be of another unit or system"):
+        update(run, tmp_path / "out", cloud)
+    given = {"read": {"shift": f"0,0,{off_m}"}}
+    assert update(run, tmp_path / "given", cloud, given)[1] == {"unchanged": HOUSES}
 
 
 @pytest.mark.parametrize("count", [1, 4, HOUSES])

@@ -23,7 +23,7 @@ import shapely
 
 from ..city.plan.registration import SAMPLE_CELL_M, hash_cell
 from ..city.plan.work_plan import WorkPlan
-from ..errors import InputWarning, SettingsError
+from ..errors import InputError, InputWarning, SettingsError
 from ..geometry.thin import hashes
 from ..log import count_things
 from ..model import Roof
@@ -68,6 +68,10 @@ CLEAR_SIGMAS = 3.0
 SAME_HEIGHT_M = 0.1
 """Roofs and ground may lie so far apart (m) between surveys, by grass that was higher or ground
 points that were chosen otherwise."""
+
+MOST_GROUND_M = 5.0
+"""Height (m) by which ground may lie apart between surveys. Beyond it units or systems differ: feet
+and metres, or heights over the ellipsoid and the sea."""
 
 CARRIED_BESIDE_GROUND, CARRIED_ALONE = 0.1, 2 / 3
 """Least share of the roofs' area that has to lie where a shift puts it: where the ground shows the
@@ -162,7 +166,16 @@ class SurveyShift:
         return SurveyShift(**values | {"noise": SurveyNoise(**values["noise"])})
 
     def warn(self, name: str) -> None:
-        """Warn (InputWarning) of what the shift of the survey `name` does not explain."""
+        """Warn (InputWarning) of what the shift of the survey `name` does not explain.
+
+        Raises InputError where heights are of another unit or system.
+        """
+        if self.doubt and abs(self.ground) > MOST_GROUND_M:
+            raise InputError(
+                f"{name}: {self.doubt}; its heights seem to be of another unit or system. "
+                "Transform them, pass their shift with --shift EAST,NORTH,UP, or --shift off if "
+                "the ground did move"
+            )
         if self.doubt:
             warnings.warn(
                 f"{name}: {self.doubt}; no shift is taken off. If the survey is shifted, pass it "
