@@ -156,3 +156,19 @@ def test_an_override_says_that_a_building_stands(tmp_path):
     overrides = str(tmp_path / "o.jsonl")
     row = run_points(tmp_path, xyz, classes, {"a": HOUSE}, overrides=overrides)[0]["a"]
     assert row["parts"] and "overridden: type flat" in row["detail"]
+
+
+@pytest.mark.parametrize("lone", [1, 2])
+def test_returns_below_the_ground_put_no_house_deeper(lone, tmp_path):
+    """Returns that came by way of a wall, of the ground's class, under a corner of each house."""
+    town = make_town(density=8.0)
+    low = [
+        [*(np.array(outline.bounds[:2]) + 0.5 + k), ORIGIN[2] - 20.0]
+        for outline in town.footprints.values()
+        for k in range(lone)
+    ]
+    xyz, classes = np.concatenate([town.xyz, low]), np.append(town.classification, [2] * len(low))
+    found, _ = run_points(tmp_path / "low", xyz, classes, town.footprints)
+    usual, _ = run_points(tmp_path / "usual", town.xyz, town.classification, town.footprints)
+    for id, row in usual.items():
+        assert found[id]["z_ground"] == pytest.approx(row["z_ground"], abs=0.05)

@@ -29,6 +29,10 @@ from ..plan.work_plan import VOID_REACH_M
 RINGS = (2, 5, 9)
 # side (m) of squares of a terrain model, of which the last ring reaches so far
 FAR_STEP_M = int(VOID_REACH_M) // RINGS[-1]
+FEWEST_TOGETHER, FEWEST_TO_TELL, LONE_M = 3, 6, 2.0
+"""Cells that are no chance together, cells around from which on fewer are left out where they lie
+so much (m) below all others: returns that came by way of a wall, in the class of the ground."""
+
 SOFT_M2 = 0.25  # cells nearer than half a metre weigh about the same
 LEVELLING = 0.1  # m2: holds the slope back where cells lie on one side only
 
@@ -105,7 +109,7 @@ class GroundAround:
         xy = np.asarray(xy_world, float)[:, :2]
         heights, missing = np.full(len(xy), np.nan), np.arange(len(xy))
         for reach in RINGS:
-            around = self.cells.select_around(xy[missing], reach, self.box)
+            around = leave_out_lone(self.cells.select_around(xy[missing], reach, self.box))
             known = np.isfinite(around[:, :, 2]).sum(axis=1)
             is_enough = known >= (3 if reach < RINGS[-1] else 1)
             heights[missing[is_enough]] = fit_planes(xy[missing[is_enough]], around[is_enough])
@@ -189,6 +193,14 @@ class LowestAround:
         heights = np.sort(around[:, :, 2], axis=1)
         is_many = np.isfinite(heights[:, 9])
         return np.where(is_many, heights[:, 1], heights[:, 0])
+
+
+def leave_out_lone(cells: np.ndarray) -> np.ndarray:
+    """Return cells (n, k, 3) in which those that lie alone, far below all others, are NaN."""
+    ascending = np.sort(cells[:, :, 2], axis=1)
+    least = ascending[:, FEWEST_TOGETHER - 1] - LONE_M
+    is_lone = (cells[:, :, 2] < least[:, None]) & np.isfinite(ascending[:, [FEWEST_TO_TELL - 1]])
+    return np.where(is_lone[:, :, None], np.nan, cells)
 
 
 def fit_planes(position: np.ndarray, cells: np.ndarray) -> np.ndarray:
