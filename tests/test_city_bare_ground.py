@@ -172,3 +172,14 @@ def test_returns_below_the_ground_put_no_house_deeper(lone, tmp_path):
     usual, _ = run_points(tmp_path / "usual", town.xyz, town.classification, town.footprints)
     for id, row in usual.items():
         assert found[id]["z_ground"] == pytest.approx(row["z_ground"], abs=0.05)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_returns_below_the_ground_are_no_ground_where_no_class_marks_it(seed, tmp_path):
+    town, rng = make_town(density=8.0), np.random.default_rng(seed)
+    west, south, east, north = town.footprints["house-1"].bounds
+    low = rng.uniform((west - 4, south - 4, -18.0), (east + 4, north + 4, -17.0), (12, 3))
+    classes = np.where(town.classification == 2, 1, town.classification)
+    given = np.concatenate([town.xyz, low]), np.append(classes, [1] * len(low))
+    found, _ = run_points(tmp_path / "low", *given, town.footprints)
+    assert found["house-1"]["z_ground"] == pytest.approx(2.36, abs=0.1)

@@ -22,6 +22,7 @@ CELL_M = 1.0  # m; a car or a bush covers a few cells, a street is some wide
 WINDOWS_M = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 11.0, 15.0, 20.0)  # half sides of the openings' windows
 SLOPE = 0.15  # a rise above the opened surface of more than this much of the half side is no ground
 PIT_M = 2.0  # a cell that lies so far below all around it is noise
+NEAREST, LONE_SHARE = 20, 0.25  # cells around one, and the share as low that makes it no ground
 # m below the middle of all heights, which no ground falls within a square: -9999 would tilt the
 # plane under all
 ABYSS_M = 500.0
@@ -69,9 +70,22 @@ def ground_grid(xyz: np.ndarray, cell_m: float = CELL_M) -> GroundGrid:
 
 def bare_points(lowest: np.ndarray) -> np.ndarray:
     """Return the ground's points among (m, 3), which are at most one a cell."""
+    lowest = lowest[~is_lone(lowest)]
     first, table = lowest_in_cells(lowest, CELL_M)
     column, row = (np.floor(lowest[:, :2] / CELL_M).astype(np.int64) - first).T
     return lowest[np.isfinite(remove_objects(table, CELL_M))[column, row]]
+
+
+def is_lone(lowest: np.ndarray) -> np.ndarray:
+    """Return whether few of the cells (m, 3) nearest to each lie as low: then it is noise.
+
+    One such cell, where roofs leave no others around, would make objects of all ground.
+    """
+    if len(lowest) < NEAREST:
+        return np.zeros(len(lowest), bool)
+    near = scipy.spatial.KDTree(lowest[:, :2]).query(lowest[:, :2], NEAREST)[1]
+    n_as_low = (lowest[near, 2] <= lowest[:, [2]] + PIT_M).sum(axis=1)
+    return np.asarray(n_as_low <= LONE_SHARE * NEAREST)
 
 
 def lowest_in_cells(xyz: np.ndarray, cell_m: float) -> tuple[tuple[int, int], np.ndarray]:
