@@ -199,17 +199,13 @@ def bent_faces(shell: FlatShell, faces: np.ndarray, normals: np.ndarray) -> np.n
     corners, face_normals = shell.corners[corner], normals[faces]
     u = np.cross(face_normals, np.eye(3)[np.abs(face_normals).argmin(axis=1)])
     u /= np.linalg.norm(u, axis=1, keepdims=True)
-    axes = u, np.cross(face_normals, u)
-    flat = np.zeros((len(shell.index), 2))
-    flat[corner] = np.column_stack([(corners * axis[place]).sum(axis=1) for axis in axes])
-    collections = triangulate(shell.draw_faces(faces, flat))
+    axes = u, np.cross(face_normals, u), face_normals
+    turned = np.zeros((len(shell.index), 3))
+    turned[corner] = np.column_stack([(corners * axis[place]).sum(axis=1) for axis in axes])
+    collections = triangulate(shell.draw_faces(faces, turned))
     triangles, owner = shapely.get_parts(collections, return_index=True)
-    places = shapely.get_coordinates(triangles).reshape(-1, 4, 2)
-    start = np.append(0, np.cumsum(np.bincount(place)))
-    triangle_normals = measure_triangle_normals(
-        places, owner, corners, flat[corner], start, face_normals
-    )
-    bent = are_bent(triangle_normals, owner, face_normals)
+    places = shapely.get_coordinates(triangles, include_z=True).reshape(-1, 4, 3)
+    bent = np.isin(np.arange(len(faces)), find_bent(measure_normals(places), owner))
     return faces[bent | shapely.is_missing(collections)]
 
 
@@ -223,36 +219,20 @@ def triangulate(polygons: np.ndarray) -> np.ndarray:
         return np.concatenate([triangulate(polygons[k : k + 1]) for k in range(len(polygons))])
 
 
-def measure_triangle_normals(
-    places: np.ndarray,
-    owner: np.ndarray,
-    corners: np.ndarray,
-    flat: np.ndarray,
-    start: np.ndarray,
-    normals: np.ndarray,
-) -> np.ndarray:
-    """Return unit normals (t, 3) of `places` (t, 4, 2) in faces' planes, zero without area."""
-    faces = np.repeat(np.arange(len(normals)), np.diff(start)).tolist()
-    vertices = dict(zip(zip(faces, *flat.T.tolist(), strict=True), corners.tolist(), strict=True))
-    first_vertices = corners[start[:-1]].tolist()
-    triangles = [
-        [vertices.get((face, x, y), first_vertices[face]) for x, y in ring[:3]]
-        for face, ring in zip(owner.tolist(), places.tolist(), strict=True)
-    ]
-    a, b, c = np.array(triangles).reshape(-1, 3, 3).swapaxes(0, 1)
+def measure_normals(triangles: np.ndarray) -> np.ndarray:
+    """Return unit normals (t, 3) of triangles (t, 4, 3) that look up, zero without area."""
+    a, b, c, _ = triangles.swapaxes(0, 1)
     result = np.cross(b - a, c - a)
     size = np.linalg.norm(result, axis=1)
-    size = np.where((result * normals[owner]).sum(axis=1) > 0.0, size, -size)
+    size = np.where(result[:, 2] > 0.0, size, -size)
     return result / np.where(size == 0.0, 1.0, size)[:, None]
 
 
-def are_bent(normals: np.ndarray, owner: np.ndarray, face_normals: np.ndarray) -> np.ndarray:
-    """Return whether faces (k,) have two triangles, `normals` (t, 3), over 20 degrees apart."""
+def find_bent(normals: np.ndarray, owner: np.ndarray) -> np.ndarray:
+    """Return the owners (t,) of two triangles, `normals` (t, 3), over 20 degrees apart."""
     has_area = normals.any(axis=1)
     # Two triangles within 10 degrees of the face are within 20 of one another.
-    aside = has_area & ((normals * face_normals[owner]).sum(axis=1) < SURELY_FLAT_COSINE)
+    aside = has_area & (normals[:, 2] < SURELY_FLAT_COSINE)
     is_apart = (normals[aside] @ normals.T < FLAT_COSINE) & has_area
     is_apart &= owner[aside, None] == owner
-    bent = np.zeros(len(face_normals), bool)
-    bent[owner[aside][is_apart.any(axis=1)]] = True
-    return bent
+    return owner[aside][is_apart.any(axis=1)]
