@@ -14,13 +14,14 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
+import shapely
 
 from ..compiled import compiled
 from ..geometry.arrays import copy_row, copy_rows, sort_values
-from ..geometry.components import label_components
 from ..geometry.point_in_polygon import flips
 
 GRID_M = 1e-4  # m; how CityJSON is rounded, so that what is checked is what is written
+PLACE_KEY = np.array([2**32, 1])  # with which both coordinates of a place make one number
 OUTSIDE, UNCOVERED = -1, -2  # labels of faces that no plane covers
 # units of GRID_M, half a millimetre: a vertex nearer to its neighbours' line is none
 COLLINEAR_UNITS = 5.0
@@ -232,46 +233,43 @@ def find_previous(owner: np.ndarray) -> np.ndarray:
 
 
 class HalfEdges(NamedTuple):
-    """Half-edges (2e,) by origin, `follow` around each `face` on the left; face 0 is unbounded."""
+    """Half-edges (2e,) by origin, `follow` around each `face` on the left; face 0 is unbounded.
+
+    The others are `polygons` (f - 1,).
+    """
 
     order: np.ndarray
     follow: np.ndarray
     face: np.ndarray
-    area: np.ndarray
+    polygons: np.ndarray
 
 
 def trace_faces(xy: np.ndarray, edges: np.ndarray) -> HalfEdges:
     """Trace the faces of an arrangement of vertices (n, 2) and edges (e, 2).
 
-    Holes belong to the face around them: the outer walk of every island is handed to the face found
-    by a ray from its leftmost vertex.
+    An edge that bounds no face, for it ends within one, has face 0 on either side.
     """
     origin, end = edges.ravel(), edges[:, ::-1].ravel()
     dx, dy = (xy[end] - xy[origin]).T
     order = np.lexsort((np.arctan2(dy, dx), origin))
     follow = np.empty_like(order)
     follow[order ^ 1] = order[find_previous(origin[order])]
-    walk = label_components(len(follow), np.array([np.arange(len(follow)), follow]))
-    anchor = xy[origin[np.unique(walk, return_index=True)[1]]][walk]
-    (ax, ay), (bx, by) = ((xy[v] - anchor).T.astype(float) for v in (origin, end))
-    size = 0.5 * np.bincount(walk, ax * by - bx * ay)
-    face_of_walk = np.where(size > 0, np.cumsum(size > 0), 0)
-    area = np.append(0.0, size[size > 0])
-    by_place = np.lexsort((xy[origin, 1], xy[origin, 0], walk))
-    leftmost = xy[origin[by_place[np.unique(walk[by_place], return_index=True)[1]]]]
-    start_y, end_y = xy[origin, 1], xy[end, 1]
-    for w in np.argsort(leftmost[:, 0], kind="stable"):
-        if size[w] > 0:
-            continue
-        x, y = leftmost[w] + (-0.5, 0.5)
-        down = np.flatnonzero((start_y > y) & (end_y < y))
-        share = (y - start_y[down]) / (end_y[down] - start_y[down])
-        at_x = xy[origin[down], 0] + share * dx[down]
-        at_x[at_x >= x] = -np.inf
-        if np.isfinite(at_x).any():
-            face_of_walk[w] = face_of_walk[walk[down[at_x.argmax()]]]
-        area[face_of_walk[w]] += size[w]
-    return HalfEdges(order, follow, face_of_walk[walk], area)
+    lines = shapely.linestrings(xy[edges].astype(float))
+    polygons = shapely.orient_polygons(shapely.get_parts(shapely.polygonize(lines)))
+    rings, owner = shapely.get_rings(polygons, return_index=True)
+    corners, ring = shapely.get_coordinates(rings, return_index=True)
+    vertex = look_up(xy @ PLACE_KEY, corners.astype(np.int64) @ PLACE_KEY)
+    starts, ends = vertex[:-1], vertex[1:]
+    keys = (starts * len(xy) + ends)[ring[:-1] == ring[1:]]
+    face = np.zeros(len(origin), np.int64)
+    face[look_up(origin * len(xy) + end, keys)] = owner[ring[:-1][ring[:-1] == ring[1:]]] + 1
+    return HalfEdges(order, follow, face, polygons)
+
+
+def look_up(keys: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """Return the places (k,) of `wanted` keys (k,) among distinct `keys` (n,)."""
+    order = np.argsort(keys)
+    return order[np.searchsorted(keys, wanted, sorter=order)]
 
 
 def edge_lengths(xy: np.ndarray, edges: np.ndarray) -> np.ndarray:
@@ -338,52 +336,6 @@ def drop_straight_vertices(xy, edges):
             touching[b, 0 if touching[b, 0] == g else 1] = e
             changed = True
     return edges
-
-
-@compiled
-def measure_chord(xy, edges, h, last, earlier):
-    """Return the length of the chord left of half-edge `h`, and the middle (2,) of it.
-
-    The chord is a ray from the half-edge's middle to the first edge of the same face. Its
-    half-edges are `last` and those that are `earlier` (2e,).
-    """
-    a, b = edges[h >> 1, h & 1], edges[h >> 1, 1 - (h & 1)]
-    ax, ay = 0.5 * (xy[a, 0] + xy[b, 0]), 0.5 * (xy[a, 1] + xy[b, 1])
-    dx, dy = float(xy[b, 0] - xy[a, 0]), float(xy[b, 1] - xy[a, 1])
-    length = np.hypot(dx, dy)
-    nx, ny, nearest, g = -dy / length, dx / length, np.inf, last
-    while g >= 0:
-        c, d = edges[g >> 1, 0], edges[g >> 1, 1]
-        cx, cy, ex, ey = xy[c, 0] - ax, xy[c, 1] - ay, xy[d, 0] - ax, xy[d, 1] - ay
-        side_c, side_d = nx * cy - ny * cx, nx * ey - ny * ex
-        if g >> 1 != h >> 1 and side_c * side_d <= 0 and side_c != side_d:
-            s = side_c / (side_c - side_d)
-            along = nx * (cx + s * (ex - cx)) + ny * (cy + s * (ey - cy))
-            if 0 < along < nearest:
-                nearest = along
-        g = earlier[g]
-    return nearest, ax + 0.5 * nearest * nx, ay + 0.5 * nearest * ny
-
-
-@compiled
-def face_points(xy, edges, face, faces, length):
-    """Return a point (f, 2) well inside each face.
-
-    It is the middle of the face's longest chord at right angles to an edge's middle. `length` (e,)
-    is that of the edges.
-    """
-    longest, best, points = np.zeros(faces), np.zeros(faces), np.zeros((faces, 2))
-    last, earlier = np.full(faces, -1, np.int64), np.empty(len(face), np.int64)
-    for h in range(len(face)):
-        longest[face[h]] = max(longest[face[h]], length[h >> 1])
-        earlier[h], last[face[h]] = last[face[h]], h
-    for h in range(len(face)):
-        f = face[h]
-        if f > 0 and length[h >> 1] >= 0.3 * longest[f]:
-            reach, x, y = measure_chord(xy, edges, h, last[f], earlier)
-            if np.isfinite(reach) and reach > best[f]:
-                best[f], points[f, 0], points[f, 1] = reach, x, y
-    return points
 
 
 @compiled

@@ -23,7 +23,6 @@ from .arrangement import (
     HalfEdges,
     dissolve,
     edge_lengths,
-    face_points,
     heights,
     label_faces,
     meeting_lines,
@@ -58,7 +57,7 @@ def merge_slivers(
         links = sides[label[sides[:, 0]] == label[sides[:, 1]]].T
         region = label_components(len(label), links)
         first = np.unique(region, return_index=True)[1]
-        size = np.bincount(region[1:], traced.area[1:], len(first))
+        size = np.bincount(region[1:], shapely.area(traced.polygons), len(first))
         is_patch = np.bincount(region[1:], ~patched[1:], len(first)) == 0
         beside = region[sides]
         is_border = beside[:, 0] != beside[:, 1]
@@ -122,7 +121,7 @@ def keep_largest_component(traced: HalfEdges, label: np.ndarray) -> None:
     """Turn all but the largest connected inside to OUTSIDE in `label` (f,), cut at necks."""
     sides, is_inside = traced.face.reshape(-1, 2), label != OUTSIDE
     component = label_components(len(label), sides[is_inside[sides].all(axis=1)].T)
-    size = np.bincount(component, traced.area * is_inside)
+    size = np.bincount(component[1:], shapely.area(traced.polygons) * is_inside[1:])
     label[component != size.argmax()] = OUTSIDE
 
 
@@ -264,7 +263,8 @@ def find_cells(problem: PlanProblem, reach: float, min_area: float, min_width: f
     soups = (outlines[0].astype(np.int64), patches[0].astype(np.int64), lines)
     xy, edges = node(np.concatenate(soups), reach)
     traced = trace_faces(xy, edges)
-    points = face_points(xy, edges, traced.face, len(traced.area), edge_lengths(xy, edges))
+    inside = shapely.get_coordinates(shapely.point_on_surface(traced.polygons))
+    points = np.concatenate([np.zeros((1, 2)), inside])
     label, patched = label_faces(points, *outlines, *planes, problem.group, *patches, patch_label)
     merge_slivers(xy, edges, traced, label, patched, problem.planes, min_area, min_width)
     keep_largest_component(traced, label)
