@@ -18,7 +18,6 @@ import shapely
 
 from ..compiled import compiled
 from ..geometry.arrays import copy_row, copy_rows, sort_values
-from ..geometry.point_in_polygon import flips
 
 GRID_M = 1e-4  # m; how CityJSON is rounded, so that what is checked is what is written
 PLACE_KEY = np.array([2**32, 1])  # with which both coordinates of a place make one number
@@ -350,62 +349,6 @@ def enclose_polygons(soup, soup_start):
                 boxes[k, axis] = min(boxes[k, axis], start, end)
                 boxes[k, 2 + axis] = max(boxes[k, 2 + axis], start, end)
     return boxes
-
-
-@compiled
-def covers(soup, soup_start, boxes, k, x, y):
-    """Return whether polygon k of the soup, in its box (k, 4), holds (x, y)."""
-    inside = False
-    if x < boxes[k, 0] or x > boxes[k, 2] or y < boxes[k, 1] or y > boxes[k, 3]:
-        return inside
-    for e in range(soup_start[k], soup_start[k + 1]):
-        if flips(soup[e, 0], soup[e, 1], soup[e, 2], soup[e, 3], x, y):
-            inside = not inside
-    return inside
-
-
-@compiled
-def active_plane(x, y, soup, soup_start, boxes, planes, plane_start):
-    """Return the plane that is active at (x, y).
-
-    It is the highest of the covering pieces' lowest planes. UNCOVERED, OUTSIDE the outline. Polygon
-    0 of the soup is the outline, polygon k + 1 the outline of piece k.
-    """
-    if not covers(soup, soup_start, boxes, 0, x, y):
-        return OUTSIDE
-    best, best_z = UNCOVERED, -np.inf
-    for k in range(len(plane_start) - 1):
-        if not covers(soup, soup_start, boxes, k + 1, x, y):
-            continue
-        lower, low_z = -1, np.inf
-        for j in range(plane_start[k], plane_start[k + 1]):
-            z = planes[j, 0] * x + planes[j, 1] * y + planes[j, 2]
-            if z < low_z - 1e-3:
-                lower, low_z = j, z
-        if low_z > best_z + 1e-3:
-            best, best_z = lower, low_z
-    return best
-
-
-@compiled
-def label_faces(
-    points, soup, soup_start, planes, plane_start, group, patches, patch_start, patch_label
-):
-    """Return the label of each face (f,), and which faces have a patch.
-
-    The label is the group of the plane active at the face's point, or that of the last patch over
-    it.
-    """
-    label, patched = np.full(len(points), OUTSIDE, np.int64), np.zeros(len(points), np.bool_)
-    boxes, patch_boxes = enclose_polygons(soup, soup_start), enclose_polygons(patches, patch_start)
-    for f in range(1, len(points)):
-        x, y = points[f, 0], points[f, 1]
-        plane = active_plane(x, y, soup, soup_start, boxes, planes, plane_start)
-        label[f] = group[plane] if plane >= 0 else plane
-        for p in range(len(patch_label)):
-            if covers(patches, patch_start, patch_boxes, p, x, y):
-                label[f], patched[f] = patch_label[p], True
-    return label, patched
 
 
 @compiled

@@ -24,13 +24,13 @@ from .arrangement import (
     dissolve,
     edge_lengths,
     heights,
-    label_faces,
     meeting_lines,
     node,
     renumber_vertices,
     trace_faces,
 )
 
+SAME_UNITS = 1e-3  # of heights that are one
 UNSEEN_UNITS = 100.0  # a centimetre: a face thinner than that is none
 BEYOND_UNITS = 1000.0  # a decimetre by which a face may rise or fall further than what is around it
 
@@ -52,12 +52,13 @@ def merge_slivers(
     on to where no roof is around keeps out, unless nobody could see the region.
     """
     sides, length = traced.face.reshape(-1, 2), edge_lengths(xy, edges)
+    area = shapely.area(traced.polygons)
     keeps_out = np.zeros(len(label), bool)
     for _ in range(len(label)):
         links = sides[label[sides[:, 0]] == label[sides[:, 1]]].T
         region = label_components(len(label), links)
         first = np.unique(region, return_index=True)[1]
-        size = np.bincount(region[1:], shapely.area(traced.polygons), len(first))
+        size = np.bincount(region[1:], area, len(first))
         is_patch = np.bincount(region[1:], ~patched[1:], len(first)) == 0
         beside = region[sides]
         is_border = beside[:, 0] != beside[:, 1]
@@ -121,7 +122,7 @@ def keep_largest_component(traced: HalfEdges, label: np.ndarray) -> None:
     """Turn all but the largest connected inside to OUTSIDE in `label` (f,), cut at necks."""
     sides, is_inside = traced.face.reshape(-1, 2), label != OUTSIDE
     component = label_components(len(label), sides[is_inside[sides].all(axis=1)].T)
-    size = np.bincount(component[1:], shapely.area(traced.polygons) * is_inside[1:])
+    size = np.bincount(component, np.append(0.0, shapely.area(traced.polygons)) * is_inside)
     label[component != size.argmax()] = OUTSIDE
 
 
@@ -233,13 +234,6 @@ def equal_planes(planes: np.ndarray, tolerance: float = 1e-6) -> np.ndarray:
     return first
 
 
-def stacked_soups(soups: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Return one array of edges and the start of each polygon in it."""
-    start = np.array([0, *itertools.accumulate(map(len, soups))])
-    edges = np.concatenate(soups) if soups else np.zeros((0, 4))
-    return np.ascontiguousarray(edges, float), start
-
-
 def arrange(
     problem: PlanProblem, reach: float, min_area_m2: float, min_width_m: float
 ) -> PlanCells:
@@ -256,19 +250,48 @@ def arrange(
 
 def find_cells(problem: PlanProblem, reach: float, min_area: float, min_width: float) -> PlanCells:
     """Return the cells of one active plane, small ones merged; some may remain UNCOVERED."""
-    outlines, planes = stacked_soups(problem.soups), (problem.planes, problem.plane_start)
-    patches = stacked_soups([patch for patch, _ in problem.patches])
-    patch_label = np.array([label for _, label in problem.patches], np.int64)
-    lines = meeting_lines(*outlines, *planes)
-    soups = (outlines[0].astype(np.int64), patches[0].astype(np.int64), lines)
-    xy, edges = node(np.concatenate(soups), reach)
+    start = np.array([0, *itertools.accumulate(map(len, problem.soups))])
+    outlines = np.ascontiguousarray(np.concatenate(problem.soups), float)
+    lines = meeting_lines(outlines, start, problem.planes, problem.plane_start)
+    soups = [outlines, *(patch for patch, _ in problem.patches), lines]
+    xy, edges = node(np.concatenate(soups).astype(np.int64), reach)
     traced = trace_faces(xy, edges)
-    inside = shapely.get_coordinates(shapely.point_on_surface(traced.polygons))
-    points = np.concatenate([np.zeros((1, 2)), inside])
-    label, patched = label_faces(points, *outlines, *planes, problem.group, *patches, patch_label)
+    label, patched = label_faces(traced.polygons, problem)
     merge_slivers(xy, edges, traced, label, patched, problem.planes, min_area, min_width)
     keep_largest_component(traced, label)
     return PlanCells(*dissolve(xy, edges, label[traced.face].reshape(-1, 2)))
+
+
+def label_faces(faces: np.ndarray, problem: PlanProblem) -> tuple[np.ndarray, np.ndarray]:
+    """Return the label of each face (f + 1,), and which faces have a patch; the first is unbounded.
+
+    The label is the group of the plane that is active in the face, the highest of the covering
+    pieces' lowest planes, or that of the last patch over it.
+    """
+    x, y = shapely.get_coordinates(shapely.point_on_surface(faces)).T
+    label, best = np.full(len(x), UNCOVERED), np.full(len(x), -np.inf)
+    for k, (lower, upper) in enumerate(itertools.pairwise(problem.plane_start), 1):
+        here = np.flatnonzero(is_inside(problem.soups[k], x, y))
+        z = heights(problem.planes[lower:upper, None], x[here], y[here])
+        lowest = (z <= z.min(axis=0) + SAME_UNITS).argmax(axis=0)
+        z = z[lowest, np.arange(len(here))]
+        is_higher = z > best[here] + SAME_UNITS
+        here = here[is_higher]
+        label[here], best[here] = problem.group[lower + lowest[is_higher]], z[is_higher]
+    label[~is_inside(problem.soups[0], x, y)] = OUTSIDE
+    patched = np.zeros(len(x), bool)
+    for soup, own in problem.patches:
+        over = is_inside(soup, x, y)
+        label[over], patched[over] = own, True
+    return np.append(OUTSIDE, label), np.append(False, patched)
+
+
+def is_inside(soup: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Return whether the polygon of edges (m, 4) holds places x, y (n,), by the even-odd rule."""
+    x0, y0, x1, y1 = soup.T[:, :, None]
+    turn = (x - x0) * (y1 - y0) - (y - y0) * (x1 - x0)
+    crosses = ((y0 > y) != (y1 > y)) & (turn * (y1 - y0) < 0.0)
+    return np.asarray(crosses.sum(axis=0) % 2 == 1)
 
 
 def drop_short_edges(cells: PlanCells, planes: np.ndarray, reach: float) -> PlanCells:
