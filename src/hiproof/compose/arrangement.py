@@ -338,20 +338,6 @@ def drop_straight_vertices(xy, edges):
 
 
 @compiled
-def enclose_polygons(soup, soup_start):
-    """Return the boxes (k, 4) around polygons: low x, low y, high x, high y."""
-    boxes = np.empty((len(soup_start) - 1, 4))
-    boxes[:, :2], boxes[:, 2:] = np.inf, -np.inf
-    for k in range(len(boxes)):
-        for e in range(soup_start[k], soup_start[k + 1]):
-            for axis in range(2):
-                start, end = soup[e, axis], soup[e, 2 + axis]
-                boxes[k, axis] = min(boxes[k, axis], start, end)
-                boxes[k, 2 + axis] = max(boxes[k, 2 + axis], start, end)
-    return boxes
-
-
-@compiled
 def inside_intervals(soup, lower, upper, px, py, dx, dy):
     """Return sorted parameters t, an even number, where (px, py) + t (dx, dy) meets a polygon."""
     cuts = np.empty(upper - lower)
@@ -387,11 +373,13 @@ def clip_to_lowest(planes, lower, upper, j, px, py, dx, dy, t_low, t_high):
 
 
 @compiled
-def meeting_lines(soup, soup_start, planes, plane_start):
-    """Return the segments (m, 4) in plan along which the active plane changes."""
+def meeting_lines(soup, soup_start, boxes, planes, plane_start):
+    """Return the segments (m, 4) in plan along which the active plane changes.
+
+    Pieces lie in `boxes` (k, 4): low x, low y, high x, high y.
+    """
     out, count = np.empty((64, 4), np.int64), 0
     pieces = len(plane_start) - 1
-    boxes = enclose_polygons(soup, soup_start[1:])
     for p in range(pieces):
         for q in range(p, pieces):
             if boxes[p, 0] > boxes[q, 2] or boxes[q, 0] > boxes[p, 2]:

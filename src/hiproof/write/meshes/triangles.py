@@ -57,37 +57,26 @@ def cut_faces(
     vertices: np.ndarray, faces: Sequence[Sequence[Sequence[int]]], normals: np.ndarray
 ) -> list[np.ndarray]:
     """Return triangles (t, 3) of faces of rings, with normals (n, 3), by constrained Delaunay."""
-    # Dropping the axis of the largest normal component keeps the plan's coordinates exact, so they
-    # name their vertex.
+    # Dropping the axis of the largest normal component keeps the plan's coordinates exact. In its
+    # place stands the number of the vertex.
     axes = np.abs(normals).argmax(axis=1)
-    drawn = [vertices[:, [(axis + 1) % 3, (axis + 2) % 3]] for axis in range(3)]
     plans = [
-        [drawn[axis][list(ring)] for ring in rings] for axis, rings in zip(axes, faces, strict=True)
+        [
+            np.column_stack([vertices[list(ring)][:, [(axis + 1) % 3, (axis + 2) % 3]], ring])
+            for ring in rings
+        ]
+        for axis, rings in zip(axes, faces, strict=True)
     ]
     polygons = [shapely.Polygon(outer, holes) for outer, *holes in plans]
     tiles, owner = shapely.get_parts(
         shapely.constrained_delaunay_triangles(polygons), return_index=True
     )
-    corners = shapely.get_coordinates(tiles).reshape(-1, 4, 2)[:, :3]
-    (ax, ay), (bx, by) = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
+    corners = shapely.get_coordinates(tiles, include_z=True).reshape(-1, 4, 3)[:, :3]
+    (ax, ay, _), (bx, by, _) = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
     turned = (ax * by - ay * bx) * normals[owner, axes[owner]] < 0
     corners[turned] = corners[turned][:, ::-1]
-    return [
-        number_corners(
-            corners[owner == number],
-            np.concatenate(plan),
-            [index for ring in rings for index in ring],
-        )
-        for number, (plan, rings) in enumerate(zip(plans, faces, strict=True))
-    ]
-
-
-def number_corners(corners: np.ndarray, plan: np.ndarray, indices: Sequence[int]) -> np.ndarray:
-    """Return indices (t, 3) of corners (t, 3, 2) among vertices `plan` (m, 2), `indices`."""
-    index_at = dict(zip(map(tuple, plan.tolist()), indices, strict=True))
-    return np.array([index_at[tuple(xy)] for xy in corners.reshape(-1, 2).tolist()], int).reshape(
-        -1, 3
-    )
+    numbers = corners[:, :, 2].astype(int)
+    return [numbers[owner == face] for face in range(len(faces))]
 
 
 @dataclass(frozen=True)
