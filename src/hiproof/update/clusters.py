@@ -15,6 +15,8 @@ import numpy as np
 from ..geometry.components import label_components
 from .cells import MEDIAN_VARIANCE, CellComparison
 
+KEY_OF_CELL = np.array([2**32, 1])  # with which a column and a row make one number
+
 CELL_SIGMAS = 3.3
 """Standard deviations from which on a cell's difference counts: by chance one in a thousand."""
 
@@ -126,14 +128,9 @@ def is_known_around(comparison: CellComparison, members: np.ndarray) -> np.ndarr
 
 def link_neighbours(cells: np.ndarray) -> np.ndarray:
     """Return the pairs (2, p) of `cells` (k, 2) that share a side."""
-    place = {(i, j): k for k, (i, j) in enumerate(cells.tolist())}
-    pairs = [
-        (k, place[other])
-        for (i, j), k in place.items()
-        for other in ((i + 1, j), (i, j + 1))
-        if other in place
-    ]
-    return np.array(pairs, np.int64).reshape(-1, 2).T
+    keys = cells.astype(np.int64) @ KEY_OF_CELL
+    pairs = [np.intersect1d(keys + side, keys, return_indices=True)[1:] for side in KEY_OF_CELL]
+    return np.hstack(pairs)
 
 
 def describe_cluster(

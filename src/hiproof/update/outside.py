@@ -25,7 +25,7 @@ from ..settings import ReadSettings
 from ..status import ChangeKind
 from ..write.files import atomic, atomic_file
 from ..write.parameters import outline_record
-from .clusters import ROUGH_M, is_strip, link_neighbours, measure_roughness
+from .clusters import KEY_OF_CELL, ROUGH_M, is_strip, link_neighbours, measure_roughness
 from .plan import EARLIER_FOLDER
 
 OUTSIDE_FILE, CELLS_FOLDER = "outside.json", "cells"
@@ -56,7 +56,6 @@ loaded: roofs that are longer are cut."""
 
 ROUNDING_M = 1e-6  # far above the errors of a mean, far below the millimetres of coordinates
 
-KEY_OF_CELL = np.array([2**32, 1])  # with which a column and a row make one number
 AROUND = np.array([(u, v) for u in (-1, 0, 1) for v in (-1, 0, 1)])
 
 
