@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import scipy
 
-from ..geometry.grid import cell_range
+from ..geometry.grid import cell_range, number_cells
 
 
 class SquareCells:
@@ -54,11 +54,7 @@ def plan_density(xy: np.ndarray) -> float:
     """Return the points a square metre, the median over occupied cells large enough for four."""
     xy = np.asarray(xy, float)[:, :2]
     for cell_m in (1.0, 2.0, 4.0, 8.0):
-        cells = np.floor(xy / cell_m).astype(np.int64)
-        cells -= cells.min(axis=0)
-        counts = np.unique(cells[:, 1] * (cells[:, 0].max() + 1) + cells[:, 0], return_counts=True)[
-            1
-        ]
+        counts = np.bincount(number_cells(np.floor(xy / cell_m))[1])
         if np.median(counts) >= 4:
             break
     return float(np.median(counts)) / cell_m**2

@@ -110,9 +110,7 @@ def split_cells(
         np.floor((along - along.min()) / cell_m).astype(np.int64) for along in xy[:, :2].T
     )
     cell = row * (column.max() + 1) + column
-    order = np.argsort(values)
-    # 16 bits are counted
-    order = order[np.argsort(cell[order].astype(np.min_scalar_type(cell.max())), kind="stable")]
+    order = np.lexsort([values, cell])
     start = np.flatnonzero(np.diff(cell[order], prepend=-1))
     counts = np.diff(start, append=len(order))
     cell = np.repeat(np.arange(len(start)), counts)

@@ -262,11 +262,8 @@ def make_cell(xy: np.ndarray, polygons: list[shapely.Polygon]) -> Cell:
     """
     from scipy import ndimage  # a third of a second, for runs with footprints alone
 
-    # complex numbers are sorted by x, then by y, in a quarter of the time of np.unique
-    places = np.sort(np.ascontiguousarray(np.asarray(xy, float)[:, :2]).view(complex).ravel())
-    places = places[np.append(True, places[1:] != places[:-1])]
-    places = places[:: -(-len(places) // MOST_SAMPLE_POINTS)]
-    xy = np.column_stack([places.real, places.imag])
+    xy = np.unique(np.asarray(xy, float)[:, :2], axis=0)
+    xy = xy[:: -(-len(xy) // MOST_SAMPLE_POINTS)]
     lower = np.floor(xy.min(axis=0) / RASTER_PITCH_M) - RASTER_MARGIN
     shape = (np.ceil(xy.max(axis=0) / RASTER_PITCH_M) + RASTER_MARGIN - lower).astype(int) + 1
     inside = rasterise(polygons, lower, shape)

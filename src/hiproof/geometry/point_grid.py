@@ -36,8 +36,6 @@ class PointGrid:
         )
         column, row = (np.floor(self.xy[:, :2] / cell_m).astype(np.int64) - self.origin).T
         keys = row * self.columns + column
-        # sorted as 16 bits where they fit: numpy then counts instead of comparing
-        keys = keys.astype(np.min_scalar_type(self.rows * self.columns))
         self.order = np.argsort(keys, kind="stable")
         self.keys = keys[self.order]
 
@@ -55,11 +53,8 @@ class PointGrid:
         left, right = max(first[0], 0), min(first[1], self.columns - 1)
         if left > right or not len(rows):
             return np.empty(0, np.int64)
-        # looked up as the keys' own type: NumPy would convert all keys otherwise
-        starts = np.searchsorted(self.keys, (rows * self.columns + left).astype(self.keys.dtype))
-        stops = np.searchsorted(
-            self.keys, (rows * self.columns + right).astype(self.keys.dtype), side="right"
-        )
+        starts = np.searchsorted(self.keys, rows * self.columns + left)
+        stops = np.searchsorted(self.keys, rows * self.columns + right, side="right")
         return np.concatenate(
             [self.order[start:stop] for start, stop in zip(starts, stops, strict=True)]
         )
