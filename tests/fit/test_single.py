@@ -6,7 +6,6 @@ import shapely
 
 from hiproof.errors import FitError, SettingsError
 from hiproof.fit import fit_roof
-from hiproof.fit.single import in_order
 from hiproof.primitives import CATALOGUE
 from hiproof.settings import Settings
 from points_of_roofs import sample_roof, typical_theta
@@ -232,11 +231,3 @@ def test_an_outline_that_is_no_polygon_is_refused(gable_points, outline):
 def test_an_outline_without_points_is_refused(gable_points):
     with pytest.raises(FitError, match="inside the outline"):
         fit_roof(gable_points, outline=shapely.box(100, 100, 110, 110))
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_rows_are_put_in_lexicographic_order(seed):
-    cloud = np.random.default_rng(seed).integers(0, 3, (30, 4)).astype(float)
-    expected = cloud[np.lexsort(cloud.T[::-1])]
-    assert np.array_equal(in_order(cloud), expected)
-    assert in_order(expected) is expected

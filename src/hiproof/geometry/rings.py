@@ -84,6 +84,13 @@ def subtract(
     return with_area(shapely.difference(area, other, grid_size=grid_m))
 
 
+def join(
+    area: shapely.Geometry, other: shapely.Geometry, grid_m: float = OVERLAY_GRID_M
+) -> shapely.Geometry:
+    """Return what lies in an area or in the other."""
+    return with_area(shapely.union(area, other, grid_size=grid_m))
+
+
 def unite(areas: Any, grid_m: float = OVERLAY_GRID_M) -> shapely.Geometry:
     """Return what lies in any of the `areas` (n,)."""
     return with_area(shapely.union_all(areas, grid_size=grid_m))

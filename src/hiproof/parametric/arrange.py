@@ -17,7 +17,7 @@ import numpy as np
 import shapely
 
 from ..errors import InputError
-from ..geometry.rings import intersect, repair_polygons, subtract, unite
+from ..geometry.rings import intersect, join, repair_polygons, subtract, unite
 from ..model import Roof
 from ..primitives.cants import keep_cants_in_place
 from .change import make_polygon, with_sizes
@@ -238,7 +238,7 @@ def moved_along(
     shared = intersect(cover_rectangle(with_sizes(part)), old, GRID_M)
     if shared.area < LEAST_M2 or roofed_by(part).intersection(shared).area > CLEAR * shared.area:
         return part
-    whole = unite([roofed_by(part), shared], GRID_M)
+    whole = join(roofed_by(part), shared, GRID_M)
     return leaving_out({**part, "outlines": list_rings(whole)}, new)
 
 

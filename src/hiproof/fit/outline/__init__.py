@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from ...geometry.rings import subtract, unite
+from ...geometry.rings import join, subtract
 from ..direction import main_direction
 from ..walls import on_walls
 from .cost import Border, Drawing, costs_by_depth, make_drawing
@@ -100,7 +100,7 @@ def close_slits(outline: shapely.Polygon) -> shapely.Polygon:
     closed = largest(shapely.buffer(wide, -0.5 * SLIT_M, join_style="mitre"))
     for slit in shapely.get_parts(subtract(closed, outline, GRID_M)):
         if slit.area > SLIT_TRACE_M2:
-            ring = largest(unite([outline, slit], GRID_M)).exterior
+            ring = largest(join(outline, slit, GRID_M)).exterior
             corners = counter_clockwise(shapely.simplify(shapely.Polygon(ring), SLIT_TRACE_M))
             if len(corners) < len(outline.exterior.coords) - 1:
                 outline = shapely.Polygon(corners)

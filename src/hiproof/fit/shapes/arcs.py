@@ -14,7 +14,7 @@ import numpy as np
 import shapely
 from shapely import affinity
 
-from ...geometry.rings import counterclockwise, intersect, subtract, unite
+from ...geometry.rings import counterclockwise, intersect, join, subtract
 from ...model import Part
 from .regions import cut_part, list_polygons
 
@@ -128,9 +128,9 @@ def cut_to_outline(shape: Part, arc: Arc, outline: shapely.Polygon) -> Iterator[
 def follow_arc(plan: shapely.Polygon, arc: Arc) -> shapely.Geometry:
     """Return a plan over the circle of an arc with its corners."""
     if arc.span_deg >= WHOLE_CIRCLE_DEG or not isinstance(arc.area, shapely.Polygon):
-        return unite([plan, arc.area])
+        return join(plan, arc.area)
     corners = shapely.get_coordinates(arc.area.exterior)[:-1]
     sector = shapely.make_valid(shapely.Polygon([arc.centre, *corners]))
     beyond = affinity.scale(sector, SECTOR_REACH, SECTOR_REACH, origin=tuple(arc.centre))
     rest = subtract(plan, beyond)
-    return unite([rest, sector])
+    return join(rest, sector)

@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 import shapely
 
-from ...geometry.rings import intersect, subtract, unite, with_area
+from ...geometry.rings import intersect, join, subtract, unite, with_area
 from ...model import Part, Piece
 from ...primitives import get
 from ...primitives.shed import TEETH
@@ -227,7 +227,7 @@ def frame_row(row: list[Part], other_parts: list[Part]) -> RowFrame:
     covered, others_area = (unite_outlines(group) for group in (row, other_parts))
     uv = (shapely.get_coordinates(covered) - origin) @ axes.T
     (left, first), (right, last) = uv.min(axis=0).tolist(), uv.max(axis=0).tolist()
-    roof = shapely.MultiPolygon(list_polygons(unite([covered, others_area])))
+    roof = shapely.MultiPolygon(list_polygons(join(covered, others_area)))
     walls = shapely.buffer(roof, CRACK_M, join_style="mitre").boundary
     return RowFrame(origin, axes, left, right, first, last, covered, roof, walls)
 
@@ -327,7 +327,7 @@ def cut_teeth(pieces: tuple[Piece, ...], breaks: np.ndarray, ground: RowFrame) -
         ground.make_strip(ground.last, breaks[-1]),
     ]
     extension = with_area(shapely.intersection(ground.roof, unite(further)))
-    row_area = unite([ground.covered, extension])
+    row_area = join(ground.covered, extension)
     strips = [ground.make_strip(foot, top) for foot, top in pairwise(breaks.tolist())]
     return tuple(
         Piece(polygon, piece.planes)
