@@ -103,6 +103,17 @@ def test_radiation_that_its_sun_cannot_make_is_refused(change, reason, tmp_path)
         make_sky(*DELFT, 0.0, 0.0, str(tmp_path / "a.epw"))
 
 
+def test_an_epw_of_a_leap_year_is_that_of_its_other_days(tmp_path):
+    write_epw(tmp_path / "a.epw")
+    lines = (tmp_path / "a.epw").read_text().splitlines(keepends=True)
+    first = next(k for k, line in enumerate(lines) if line.startswith("2023,3,1,"))
+    leap = [line.replace("2023,3,1,", "2023,2,29,") for line in lines[first : first + 24]]
+    (tmp_path / "leap.epw").write_text("".join([*lines[:first], *leap, *lines[first:]]))
+    years = [make_sky(*DELFT, 0.0, 0.0, str(tmp_path / name)) for name in ("a.epw", "leap.epw")]
+    for own, other in zip(*years, strict=True):
+        assert np.array_equal(own, other)
+
+
 def test_a_year_without_direct_radiation_comes_with_a_warning(tmp_path):
     write_epw(tmp_path / "a.epw", change=make_overcast)
     with pytest.warns(InputWarning, match="a.epw: has hardly any direct radiation in a year"):

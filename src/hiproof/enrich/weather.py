@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import functools
 import io
+import re
 import warnings
 from importlib import import_module
 from pathlib import Path
@@ -23,6 +24,7 @@ from ..log import count_things
 
 YEAR = "2023"  # of all hours: no leap year, and its sun is that of any year
 HOURS = 8760  # of a year that is no leap year
+LEAP_DAY = re.compile(r"^\d+, *0?2, *29,.*\n", re.MULTILINE)  # its rows in EPW
 FARTHEST_STATION_KM = 300.0  # distance (km) beyond which weather says nothing of a place
 EARTH_RADIUS_KM = 6371.0  # mean radius
 PVGIS_CSV = "Latitude"  # beginning of PVGIS' tables; other tables are TMY3's
@@ -150,7 +152,8 @@ def parse_weather(path: Path) -> Weather:
 
 
 def parse_epw(text: str) -> Weather:
-    """Read EPW. Its hours end at their stamps, where pvlib's begin."""
+    """Read EPW, without a leap day. Its hours end at their stamps, where pvlib's begin."""
+    text = LEAP_DAY.sub("", text)
     values, station = import_pvlib().iotools.read_epw(io.StringIO(text), coerce_year=int(YEAR))
     return Weather(shift_hours(values.index, 0.5), values, locate_station(station))
 
