@@ -325,3 +325,22 @@ def test_a_run_says_that_a_clouds_heights_come_in_coarse_steps(tmp_path):
         InputWarning, match=r"cloud\.xyzc: coordinates come in steps of 0\.1 m in height, and roofs"
     ):
         make_plan(request)
+
+
+@pytest.mark.parametrize("up", [0.0, 43.0])
+def test_files_side_by_side_whose_heights_never_meet_are_told(up, tmp_path):
+    """As where one tile has heights over the ellipsoid: a house on the border is 43 m tall."""
+    town = make_town(houses=2)
+    is_east = town.xyz[:, 0] > ORIGIN[0] + 44
+    town.xyz[is_east, 2] += up
+    clouds = tuple(
+        str(write_cloud(tmp_path / f"{name}.laz", town.xyz[part], town.classification[part]))
+        for name, part in (("west", ~is_east), ("east", is_east))
+    )
+    outlines = str(write_footprints(tmp_path / "outlines.geojson", town.footprints))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        reconstruct_area(Request(clouds, tmp_path / "out", outlines))
+    texts = [str(w.message) for w in caught if "another unit or height system" in str(w.message)]
+    assert len(texts) == bool(up)
+    assert all("east.laz: has heights from" in text and "west.laz" in text for text in texts)

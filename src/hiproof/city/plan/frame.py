@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import shapely
 
 from ...errors import InputError, InputWarning
 from ...frames import Units
@@ -30,6 +31,8 @@ from ...read.points.pointcloud import PointFileHeader, common_crs, warn_coarse
 SAME_UNIT = 1e-5
 # of a length; national grids and UTM zones stay below 0.005, at 0.01 a house of 10 m is 10 cm off
 MOST_STRETCH = 0.01
+# of plan and of height, in the unit of the files: the ground goes on from one file to the next
+BESIDE, APART = 2.0, 10.0
 
 
 @dataclass(frozen=True)
@@ -71,6 +74,7 @@ def settle_frame(request: Any, headers: list[PointFileHeader]) -> AreaFrame:
     if cloud is None and (footprints is not None or read.unit == "auto"):
         log_assumed_crs(headers[0].path, frame)
     warn_coarse(headers, frame.units)
+    warn_of_heights_apart(headers)
     if frame.crs is not None:
         warn_outside_area_of_use(headers, frame)
     return frame
@@ -130,6 +134,21 @@ def warn_outside_area_of_use(headers: list[PointFileHeader], frame: AreaFrame) -
             f"{headers[0].path}: in {describe_crs(frame.crs)} a metre on the ground is {times:.2f} "
             "m long there, and so are roofs, but not their heights; reproject clouds and "
             "footprints to the UTM zone or the national grid",
+            InputWarning,
+        )
+
+
+def warn_of_heights_apart(headers: list[PointFileHeader]) -> None:
+    """Warn once where files side by side have no height in common."""
+    known = [header for header in headers if np.isfinite(header.bounds).all()]
+    west, south, low, east, north, high = np.array([h.bounds for h in known]).reshape(-1, 6).T
+    boxes = shapely.box(west, south, east, north)
+    pairs = shapely.STRtree(boxes).query(boxes, predicate="dwithin", distance=BESIDE).T
+    for upper, lower in pairs[low[pairs[:, 0]] > high[pairs[:, 1]] + APART][:1].tolist():
+        warnings.warn(
+            f"{known[upper].path}: has heights from {low[upper]:.1f} to {high[upper]:.1f}, and "
+            f"{known[lower].path} beside it from {low[lower]:.1f} to {high[lower]:.1f}; one of "
+            "them seems to be in another unit or height system, which spoils houses on the border",
             InputWarning,
         )
 
