@@ -318,7 +318,8 @@ def measure_height(points: np.ndarray, ground: np.ndarray) -> float | None:
     """
     low, high = (f(points[:, :2], axis=0) for f in (np.min, np.max))
     low, high = low - GROUND_AROUND_M, high + GROUND_AROUND_M
-    heights = ground[((ground[:, :2] >= low) & (ground[:, :2] <= high)).all(axis=1), 2]
+    middles = find_cells(ground) + 0.5
+    heights = ground[((middles >= low) & (middles <= high)).all(axis=1), 2]
     return float(np.median(points[:, 2]) - np.median(heights)) if len(heights) else None
 
 
