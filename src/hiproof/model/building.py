@@ -169,11 +169,6 @@ class Building:
         return self.model.roof
 
     @property
-    def local_ground(self) -> float:
-        """The height of the ground in the roof's frame. Raises NoModelError without a model."""
-        return self.z_ground - float(self.roof.frame.origin[2])
-
-    @property
     def solid(self) -> Solid:
         """The model's solid, in world coordinates. Raises NoModelError without a model."""
         return self.model.solid

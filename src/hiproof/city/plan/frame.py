@@ -141,16 +141,17 @@ def warn_outside_area_of_use(headers: list[PointFileHeader], frame: AreaFrame) -
 def warn_of_heights_apart(headers: list[PointFileHeader]) -> None:
     """Warn once where files side by side have no height in common."""
     known = [header for header in headers if np.isfinite(header.bounds).all()]
-    west, south, low, east, north, high = np.array([h.bounds for h in known]).reshape(-1, 6).T
-    boxes = shapely.box(west, south, east, north)
-    pairs = shapely.STRtree(boxes).query(boxes, predicate="dwithin", distance=BESIDE).T
-    for upper, lower in pairs[low[pairs[:, 0]] > high[pairs[:, 1]] + APART][:1].tolist():
-        warnings.warn(
-            f"{known[upper].path}: has heights from {low[upper]:.1f} to {high[upper]:.1f}, and "
-            f"{known[lower].path} beside it from {low[lower]:.1f} to {high[lower]:.1f}; one of "
-            "them seems to be in another unit or height system, which spoils houses on the border",
-            InputWarning,
-        )
+    boxes = shapely.box(*plan_bounds(known).T)
+    for pair in shapely.STRtree(boxes).query(boxes, predicate="dwithin", distance=BESIDE).T:
+        upper, lower = (known[k] for k in pair)
+        if upper.bounds[2] > lower.bounds[5] + APART:
+            warnings.warn(
+                f"{upper.path}: has heights from {upper.bounds[2]:.1f} on, and {lower.path} beside "
+                f"it up to {lower.bounds[5]:.1f}; one of them seems to be in another unit or "
+                "height system, which spoils houses on the border",
+                InputWarning,
+            )
+            return
 
 
 def plan_bounds(headers: list[PointFileHeader]) -> np.ndarray:
