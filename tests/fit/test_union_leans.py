@@ -67,7 +67,7 @@ def test_facing_walls_never_costs(seed):
     rng = np.random.default_rng(seed)
     volumes, scene = draw_volumes(rng), draw_scene(rng)
 
-    value = compute_objective(volumes, scene, np.inf)
+    value = compute_objective(volumes, scene)
     for k in range(1, len(volumes)):
         result, lower = face_walls(
             volumes.copy(),
@@ -77,7 +77,7 @@ def test_facing_walls_never_costs(seed):
             measure_context(volumes, scene.U, scene.V, scene.order, k),
         )
         assert lower <= value
-        assert compute_objective(result, scene, np.inf) == pytest.approx(lower, rel=1e-9)
+        assert compute_objective(result, scene) == pytest.approx(lower, rel=1e-9)
         assert np.isfinite(result[:, LEAN0 : LEAN0 + N_SIDES]).all()
 
 
@@ -93,7 +93,7 @@ def test_facing_walls_takes_no_plane_away(seed):
         result, _ = face_walls(
             volumes.copy(),
             scene,
-            compute_objective(volumes, scene, np.inf),
+            compute_objective(volumes, scene),
             k,
             measure_context(volumes, scene.U, scene.V, scene.order, k),
         )

@@ -11,10 +11,8 @@ planes      compiled: planes and gables that explain rectangles of points
 candidates  volumes made of these planes, and where each would gain most
 volumes     compiled: a volume as a row of numbers, and the heights of a roof
 around      compiled: the heights that the other volumes leave for one
-beside      compiled: the price of the edges beside a moving volume
-steps       compiled: the price of an edge of a volume that is visible
 prices      the table of prices: what a unit is, what structure costs, what a change must gain
-objective   compiled: the cost of a roof: misfit, volumes and visible edges
+objective   compiled: the cost of a roof: misfit, volumes, edges on lines of their own
 edges       compiled: moves of a volume's edges
 refit       compiled: least squares for a volume's planes
 moves       compiled: moves that change one volume

@@ -205,10 +205,8 @@ def settle_new(volumes, scene, value, context):
     k, trial_value = len(volumes) - 1, np.inf
     for units in NEW_UNITS, NEW_MOVED_UNITS:
         refit(volumes, scene, k, context)
-        trial_value = compute_objective_with(
-            volumes, scene, k, context, value + units * scene.evidence
-        )
-        if trial_value == np.inf:
-            break
+        trial_value = compute_objective_with(volumes, scene, k, context)
+        if trial_value > value + units * scene.evidence:
+            return volumes, np.inf
         trial_value = move_edges(volumes, scene, k, trial_value, EVERYWHERE, context)
     return volumes, trial_value if trial_value < value - NO_GAIN else np.inf

@@ -53,7 +53,6 @@ WRONG_COVER = 0.02  # Price (points) of covering a point without explaining it.
 # Most planes that are found, of all points and of those that a roof leaves unexplained. Structure
 # that explains less stays unseen.
 MOST_PLANES, MOST_NEW_PLANES = 16, 10
-NEW_EDGES = 0.5  # Least price (units) of the edges of a new volume.
 
 
 class Effort(NamedTuple):
@@ -328,7 +327,7 @@ def find_best_rectangles(scene, candidates, cell_u, cell_v, cost_now, z_now, rep
     threshold, most_gain = 0.0, cost_now.sum()
     for m in range(len(candidates)):
         direction = int(candidates[m, DIRECTION])
-        price = scene.evidence * (price_volume(candidates[m]) + NEW_EDGES)
+        price = scene.evidence * price_volume(candidates[m])
         least_gain = price + threshold
         if (
             most_gain <= least_gain

@@ -1,7 +1,6 @@
 """Move the edges of rectangles to where the objective is lowest. Compiled.
 
-The misfit depends on one edge as a running sum over the points in order of their distance. Only the
-steps that a move can change are charged anew, and only where the misfit leaves room for a gain.
+The misfit depends on one edge as a running sum over the points in order of their distance.
 """
 
 from __future__ import annotations
@@ -11,10 +10,8 @@ import numpy as np
 from ...compiled import compiled
 from ...geometry.arrays import find_place
 from .around import compute_roof_everywhere
-from .beside import BOX0, gather_neighbour_edges, make_room, price_neighbour_edge
-from .objective import BASE_SHARE, compute_costs
+from .objective import BASE_SHARE, compute_costs, price_loose_edges
 from .prices import BASE_COST
-from .steps import COVER_TOUCH_M, gather_walls, list_near, price_edge, widen_rectangle
 from .volumes import (
     DIRECTION,
     LEVEL,
@@ -32,9 +29,6 @@ BEYOND_OUTLINE_M = 0.6  # An edge so far (m) outside the outline is not visible.
 VERTEX_REACH_M = 1.5  # Corners of the outline within this distance (m) are places for an edge.
 SMALL_STEPS = 4  # Steps tried to either side of an edge.
 SMALL_STEP_M = 0.1  # Length of such a step (m).
-# Places nearer than this (m) are one. Of a corner of the outline and a grid line at it, the corner
-# comes first.
-EQUAL_PLACE_M = 1e-3
 NO_GAIN = 1e-6  # Change of the objective that is numerically none.
 EVERYWHERE = 60.0  # Reach (m) beyond which no place for an edge lies.
 
@@ -64,10 +58,6 @@ def move_edges(volumes, scene, k, value, reach, context):
     fixed = cost_without.sum()
     for j in range(1, len(volumes)):
         fixed += scene.evidence * price_volume(volumes[j])
-    charge, touched = np.zeros((len(volumes), 4)), np.zeros((len(volumes), 4), np.bool_)
-    walls, is_charged = gather_walls(scene), False
-    neighbours = np.zeros((0, 0), np.int64)
-    beside = make_room(0)
     sums, places = np.empty((3, len(gain))), np.empty(count_most_places(scene, len(volumes)))
     for edge in range(4):
         m = list_edge_places(volumes, scene, k, edge, places)
@@ -76,8 +66,6 @@ def move_edges(volumes, scene, k, value, reach, context):
         count = sum_outward(volumes, scene, k, edge, gain, bare, sums)
         distance, gains, covered = sums[0, :count], sums[1, :count], sums[2, :count]
         best, best_place = value - NO_GAIN, start
-        # The bounds are the cost of the roof at each place before its edges are charged.
-        bounds = np.full(m, np.inf)
         for q in range(m):
             t = places[q]
             if abs(t - start) > reach or sign * (t - opposite) < MIN_SIDE_M:
@@ -85,31 +73,16 @@ def move_edges(volumes, scene, k, value, reach, context):
             p = find_place(distance, sign * t)
             while p < len(distance) and distance[p] == sign * t:
                 p += 1
-            bounds[q] = fixed + (gains[p - 1] if p > 0 else 0.0)
+            trial = fixed + (gains[p - 1] if p > 0 else 0.0)
             if always_bare - (covered[p - 1] if p > 0 else 0.0) > BASE_SHARE * scene.n:
-                bounds[q] += scene.evidence * BASE_COST
-        while True:
-            cheapest = np.argmin(bounds)
-            t, trial = places[cheapest], bounds[cheapest]
-            if trial >= best:
-                break
-            bounds[cheapest] = np.inf
-            if is_repeated(places, cheapest):
-                continue
-            if not is_charged:
-                is_charged = True
-                if len(neighbours) == 0:
-                    neighbours = list_near(volumes, walls.turn, k)
-                    beside = gather_neighbour_edges(volumes, walls, neighbours, k)
-                charge_edges(volumes, walls, neighbours, k, beside, charge)
-            trial = charge_move(
-                volumes, walls, neighbours, k, edge, t, trial, best, charge, beside, touched
-            )
+                trial += scene.evidence * BASE_COST
+            if trial < best:
+                volumes[k, U0 + edge] = t
+                trial += price_loose_edges(volumes, scene)
             if trial < best:
                 best, best_place = trial, t
-        if best_place != start:
-            volumes[k, U0 + edge] = best_place
-            value, is_charged = best, False
+        volumes[k, U0 + edge] = best_place
+        value = value if best_place == start else best
     return value
 
 
@@ -191,66 +164,3 @@ def list_edge_places(volumes, scene, k, edge, places):
                 m += 1
     places[m] = lines[0] - BEYOND_OUTLINE_M if edge % 2 == 0 else last + BEYOND_OUTLINE_M
     return m + 1
-
-
-@compiled
-def is_repeated(places, q):
-    """Return whether the q-th place is one of those before it."""
-    for p in range(q):
-        if abs(places[p] - places[q]) < EQUAL_PLACE_M:
-            return True
-    return False
-
-
-@compiled
-def charge_edges(volumes, walls, neighbours, k, beside, charge):
-    """Fill `charge` (k, 4) with the price of every edge."""
-    ends = widen_rectangle(volumes, k)
-    for j in range(1, len(volumes)):
-        for e in range(4):
-            if j == k:
-                charge[j, e] = price_edge(volumes, walls, j, e, neighbours)
-            else:
-                charge[j, e] = price_neighbour_edge(beside, j, e, ends)
-
-
-@compiled
-def charge_move(volumes, walls, neighbours, k, edge, t, trial, best, charge, beside, touched):
-    """Add the price of all edges to `trial`, with edge `edge` of volume k at `t`.
-
-    It stops as soon as the sum is not below `best`. `touched` is room for which edges (k, 4) the
-    move touches.
-    """
-    start = volumes[k, U0 + edge]
-    touch = 2.0 * COVER_TOUCH_M
-    move_low, move_high = min(start, t) - touch, max(start, t) + touch
-    cross_low, cross_high = (
-        (volumes[k, V0], volumes[k, V1]) if edge < 2 else (volumes[k, U0], volumes[k, U1])
-    )
-    along, cross = (BOX0, BOX0 + 2) if edge < 2 else (BOX0 + 2, BOX0)
-    edges = beside.edges
-    for j in range(1, len(volumes)):
-        for e in range(4):
-            if j == k:
-                is_touched = e != edge ^ 1
-            else:
-                meets = edges[j, e, along] <= move_high and edges[j, e, along + 1] >= move_low
-                is_beside = (
-                    edges[j, e, cross] <= cross_high + touch
-                    and edges[j, e, cross + 1] >= cross_low - touch
-                )
-                is_touched = meets and is_beside
-            touched[j, e] = is_touched
-            if not is_touched:
-                trial += walls.evidence * charge[j, e]
-    volumes[k, U0 + edge] = t
-    for e in range(4):  # its own edges cost the most
-        if trial < best and touched[k, e]:
-            trial += walls.evidence * price_edge(volumes, walls, k, e, neighbours)
-    ends = widen_rectangle(volumes, k)
-    for j in range(1, len(volumes)):
-        for e in range(4):
-            if trial < best and j != k and touched[j, e]:
-                trial += walls.evidence * price_neighbour_edge(beside, j, e, ends)
-    volumes[k, U0 + edge] = start
-    return trial

@@ -59,7 +59,7 @@ def face_walls(volumes, scene, value, k, context):
                         trial[k], plane, (lean if plane % 2 else -lean) + 0.0, middles[plane]
                     )
                 refit(trial, scene, k, context)
-                trial_value = compute_objective_with(trial, scene, k, context, best_value)
+                trial_value = compute_objective_with(trial, scene, k, context)
                 if trial_value < best_value:
                     best, best_value = trial, trial_value
         best, best_value = face_freely(best, scene, best_value, k, axis, context)
@@ -84,7 +84,7 @@ def face_freely(volumes, scene, value, k, axis, context):
             lean = trial[k, LEAN0 + plane] + turns[plane]
             turn_plane(trial[k], plane, min(max(lean, -MOST_TURN), MOST_TURN), middles[plane])
         refit(trial, scene, k, context)
-        trial_value = compute_objective_with(trial, scene, k, context, limit)
+        trial_value = compute_objective_with(trial, scene, k, context)
         if trial_value < limit:
             volumes, value, limit = trial.copy(), trial_value, trial_value
     return volumes, value

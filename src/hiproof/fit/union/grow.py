@@ -48,9 +48,7 @@ def grow(scene: Scene, effort: Effort = HOUSE) -> tuple[np.ndarray, float]:
     base = make_base(float(np.partition(scene.z[: scene.n], place)[place]))
     candidates = list_candidates(scene, np.arange(scene.n), MOST_PLANES, effort)
     ground = prepare_growth(scene, candidates)
-    volumes, value = grow_volumes(
-        base, compute_objective(base, scene, np.inf), ground, candidates, effort
-    )
+    volumes, value = grow_volumes(base, compute_objective(base, scene), ground, candidates, effort)
     return regrow_volumes(volumes, value, ground, candidates, effort)
 
 
@@ -79,7 +77,7 @@ def regrow_volumes(
     while k > 0 and len(volumes) > 2:
         trial = remove_volume(volumes, k)
         trial, trial_value = improve(
-            trial, scene, compute_objective(trial, scene, np.inf), ground.slopes, IMPROVING_ROUNDS
+            trial, scene, compute_objective(trial, scene), ground.slopes, IMPROVING_ROUNDS
         )
         trial, trial_value = grow_volumes(
             trial, trial_value, ground, candidates, effort, (len(volumes), value)

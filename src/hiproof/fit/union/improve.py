@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from ...compiled import compiled
 from .around import measure_context
 from .edges import EVERYWHERE, NO_GAIN, move_edges
@@ -20,7 +18,6 @@ from .moves import (
     refit_volume,
 )
 from .objective import compute_objective
-from .steps import enclose_volume
 from .volumes import DIRECTION, LEVEL, OFFSET0, SETTLED, U0, U1, V0, V1
 
 DIGEST_REACH_M = 0.5  # Volumes nearer than this (m) belong to each other's surroundings.
@@ -79,8 +76,8 @@ def drop_base(volumes, scene, value):
     volumes[0, SETTLED] = digest_surroundings(volumes, scene.turn, 0)
     trial = volumes.copy()
     trial[0, OFFSET0 + LEVEL] = scene.low - 0.7
-    trial_value = compute_objective(trial, scene, value + 0.3 * scene.n)
-    if trial_value < np.inf:
+    trial_value = compute_objective(trial, scene)
+    if trial_value < value + 0.3 * scene.n:
         trial_value = move_all_edges(trial, scene, trial_value, EVERYWHERE)
     return (trial, trial_value) if trial_value < value - NO_GAIN else (volumes, value)
 
@@ -98,15 +95,8 @@ def digest_surroundings(volumes, turn, k):
     These are the base's height, and volumes whose rectangles may meet its own.
     """
     total = math.floor(volumes[0, OFFSET0 + LEVEL] / DIGEST_STEP)
-    direction = int(volumes[k, DIRECTION])
     for j in range(1, len(volumes)):
-        low_u, high_u, low_v, high_v = enclose_volume(volumes, j, turn, direction)
-        if (
-            low_u > volumes[k, U1] + DIGEST_REACH_M
-            or high_u < volumes[k, U0] - DIGEST_REACH_M
-            or low_v > volumes[k, V1] + DIGEST_REACH_M
-            or high_v < volumes[k, V0] - DIGEST_REACH_M
-        ):
+        if not may_meet(volumes, j, k, turn):
             continue
         term = 1
         for q in range(SETTLED):
@@ -115,3 +105,25 @@ def digest_surroundings(volumes, turn, k):
             term ^= term >> 29
         total += term
     return float(total & DIGEST_BITS) + 1.0
+
+
+@compiled
+def may_meet(volumes, j, k, turn):
+    """Return whether volume j reaches within DIGEST_REACH_M of volume k, in the axes of k."""
+    other, direction = int(volumes[j, DIRECTION]), int(volumes[k, DIRECTION])
+    cosine = turn[other, 0] * turn[direction, 0] + turn[other, 1] * turn[direction, 1]
+    sine = turn[other, 1] * turn[direction, 0] - turn[other, 0] * turn[direction, 1]
+    half_u, half_v = (
+        0.5 * (volumes[j, U1] - volumes[j, U0]),
+        0.5 * (volumes[j, V1] - volumes[j, V0]),
+    )
+    u, v = volumes[j, U0] + half_u, volumes[j, V0] + half_v
+    reach_u = abs(cosine) * half_u + abs(sine) * half_v + DIGEST_REACH_M
+    reach_v = abs(sine) * half_u + abs(cosine) * half_v + DIGEST_REACH_M
+    u, v = cosine * u - sine * v, sine * u + cosine * v
+    return (
+        u - reach_u <= volumes[k, U1]
+        and u + reach_u >= volumes[k, U0]
+        and v - reach_v <= volumes[k, V1]
+        and v + reach_v >= volumes[k, V0]
+    )

@@ -101,7 +101,7 @@ def search_block(whole: Whole, box: Box) -> tuple[np.ndarray, Scene] | None:
     if scene is None or full is None:
         return None
     volumes = grow(scene, BLOCK)[0]
-    value = compute_objective(volumes, full, np.inf)
+    value = compute_objective(volumes, full)
     volumes, value = refit_volumes(volumes, full, value)
     return trim(volumes, full, value)[0], full
 

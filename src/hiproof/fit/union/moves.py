@@ -64,10 +64,9 @@ def settle_move(trial, scene, k, value, reach, context):
     Also returns the objective, infinite if it is not below `value`.
     """
     refit(trial, scene, k, context)
-    limit = value + BEGIN_UNITS * scene.evidence + BEGIN_SHARE * scene.n
-    trial_value = compute_objective_with(trial, scene, k, context, limit)
-    if trial_value == np.inf:
-        return trial, trial_value
+    trial_value = compute_objective_with(trial, scene, k, context)
+    if trial_value > value + BEGIN_UNITS * scene.evidence + BEGIN_SHARE * scene.n:
+        return trial, np.inf
     trial_value = move_edges(trial, scene, k, trial_value, reach, context)
     trial, trial_value = refit_volume(trial, scene, trial_value, k, context)
     return (trial, trial_value) if trial_value < value - NO_GAIN else (trial, np.inf)
@@ -93,7 +92,7 @@ def refit_volume(volumes, scene, value, k, context):
     """Refit volume k, if that helps."""
     trial = volumes.copy()
     refit(trial, scene, k, context)
-    trial_value = compute_objective_with(trial, scene, k, context, value)
+    trial_value = compute_objective_with(trial, scene, k, context)
     return (trial, trial_value) if trial_value < value - NO_GAIN else (volumes, value)
 
 
@@ -112,8 +111,8 @@ def drop_volumes(volumes, scene, value):
     k = 1
     while k < len(volumes):
         trial = remove_volume(volumes, k)
-        trial_value = compute_objective(trial, scene, value - NO_GAIN)
-        if trial_value < np.inf:
+        trial_value = compute_objective(trial, scene)
+        if trial_value < value - NO_GAIN:
             volumes, value = trial, trial_value
         else:
             k += 1

@@ -1,11 +1,11 @@
-"""Compute a roof's cost in points: misfit, volumes, visible steps. Compiled.
+"""Compute a roof's cost in points: misfit and volumes. Compiled.
 
     sum over points of min((max(|dz| - dead, 0) / width)^2, 1)
     + sum over unobserved cells of their weight, where the roof leaves the points' range of heights,
       and a little where it is high although no point was seen around: what is hidden is lower
-    + evidence * (volumes + offsets + slopes + visible edges)
+    + evidence * (volumes + offsets + slopes + edges on lines of their own)
 
-The price of edges is in steps.py.
+What is seen of edges is priced by `fit.roof`, which draws them.
 """
 
 from __future__ import annotations
@@ -14,10 +14,11 @@ import numpy as np
 
 from ...compiled import compiled
 from .around import compute_roof_with
-from .prices import BASE_COST
-from .steps import gather_walls, list_near, price_edge
-from .volumes import LEVEL, OFFSET0, compute_roof_heights, is_allowed, price_volume
+from .prices import BASE_COST, LOOSE_COST
+from .volumes import DIRECTION, LEVEL, OFFSET0, U0, compute_roof_heights, is_allowed, price_volume
 
+SAME_LINE_M = 1e-6  # Edges nearer (m) than this to a line lie on it.
+BORDER_M = 0.2  # An edge within this distance (m) of the outline's bounds ends the roof.
 BASE_SHARE = 0.01  # The base costs nothing if it is visible on less of the outline's area.
 
 
@@ -55,33 +56,27 @@ def compute_costs(z, scene):
 
 
 @compiled
-def compute_objective(volumes, scene, limit):
-    """Compute the roof's cost.
-
-    It is infinite if a shape is not allowed, and once it is known to exceed `limit`.
-    """
+def compute_objective(volumes, scene):
+    """Compute the roof's cost. It is infinite if a shape is not allowed."""
     for k in range(1, len(volumes)):
         if not is_allowed(volumes[k], scene.allowed):
             return np.inf
     z, _ = compute_roof_heights(volumes, scene.U, scene.V, scene.order)
-    return compute_roof_cost(volumes, scene, z, limit)
+    return compute_roof_cost(volumes, scene, z)
 
 
 @compiled
-def compute_objective_with(volumes, scene, k, context, limit):
+def compute_objective_with(volumes, scene, k, context):
     """Compute the objective of a roof of which volume k alone changed."""
     if k > 0 and not is_allowed(volumes[k], scene.allowed):
         return np.inf
     z = compute_roof_with(volumes, scene.U, scene.V, k, context)
-    return compute_roof_cost(volumes, scene, z, limit)
+    return compute_roof_cost(volumes, scene, z)
 
 
 @compiled
-def compute_roof_cost(volumes, scene, z, limit):
-    """Compute the cost of a roof with heights `z` (n + g,).
-
-    It is infinite once it is known to exceed `limit`.
-    """
+def compute_roof_cost(volumes, scene, z):
+    """Compute the cost of a roof with heights `z` (n + g,)."""
     total, bare, base = compute_costs(z, scene).sum(), 0.0, volumes[0, OFFSET0 + LEVEL]
     for k in range(1, len(volumes)):
         total += scene.evidence * price_volume(volumes[k])
@@ -90,22 +85,41 @@ def compute_roof_cost(volumes, scene, z, limit):
             bare += scene.weight[i]
     if bare > BASE_SHARE * scene.n:
         total += scene.evidence * BASE_COST
-    total += price_edges(volumes, scene, limit - total)
-    return total if total <= limit else np.inf
+    return total + price_loose_edges(volumes, scene)
 
 
 @compiled
-def price_edges(volumes, scene, limit):
-    """Sum up the price of all edges; infinite once it is known to exceed `limit`."""
-    if limit < 0.0:
-        return np.inf
-    walls, neighbours, total = gather_walls(scene), list_near(volumes, scene.turn, -1), 0.0
+def price_loose_edges(volumes, scene):
+    """Sum up what edges on lines of their own cost."""
+    count = 0
     for k in range(1, len(volumes)):
         for edge in range(4):
-            if total > limit:
-                return np.inf
-            total += scene.evidence * price_edge(volumes, walls, k, edge, neighbours)
-    return total
+            count += is_loose(volumes, scene, k, edge)
+    return scene.evidence * LOOSE_COST * count
+
+
+@compiled
+def is_loose(volumes, scene, k, edge):
+    """Return whether no corner of the outline and no other volume gives an edge's place.
+
+    An edge outside the outline is not visible.
+    """
+    direction, axis, place = int(volumes[k, DIRECTION]), edge // 2, volumes[k, U0 + edge]
+    vertices = scene.vertices[direction, axis]
+    highest = vertices[0]
+    for x in vertices:
+        if x < np.inf:
+            highest = x
+            if abs(x - place) < SAME_LINE_M:
+                return False
+    if place < vertices[0] + BORDER_M or place > highest - BORDER_M:
+        return False
+    for j in range(1, len(volumes)):
+        if j != k and int(volumes[j, DIRECTION]) == direction:
+            for other in range(2 * axis, 2 * axis + 2):
+                if abs(volumes[j, U0 + other] - place) < SAME_LINE_M:
+                    return False
+    return True
 
 
 def is_base_visible(volumes: np.ndarray, scene) -> bool:

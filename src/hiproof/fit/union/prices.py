@@ -8,7 +8,6 @@ such costs, and all of them are here.
 from __future__ import annotations
 
 import math
-from collections import namedtuple
 
 import numpy as np
 
@@ -53,15 +52,10 @@ def compute_unit_points(density: float, area_m2: float, settings) -> float:
 
 # What structure costs, in units.
 
-PART_COST, PARAMETER_COST = 0.5, 0.45  # a volume, and each of its offsets and its own slopes
+PART_COST, PARAMETER_COST = 1.0, 0.45  # a volume, and each of its offsets and its own slopes
 REPLACING_COST, BASE_COST = 0.5, 0.95  # a volume that replaces others; a visible base
+LOOSE_COST = 0.6  # an edge where neither a corner of the outline nor another volume has one
 LEANING_COST = 0.1  # each plane that leans: the wall says how, but which wall is a choice
-
-EdgePrices = namedtuple("EdgePrices", "any_step a_metre low_a_metre low_step loose at_corner")
-"""The price of a visible edge: a fixed sum, more by the metre, more by the metre of low steps
-(lower than `low_step`, in metres), more in line with no corner, less where it ends in one.
-"""
-EDGE_PRICES = EdgePrices(0.7, 0.08, 0.15, 0.5, 0.6, 0.5)  # in this order
 
 KIND_COST = np.array([1.0, 1.4, 1.4, 1.9])
 """A plane among the candidates: level, sloping along u, along v, and freely."""

@@ -37,8 +37,8 @@ WALL_M = 2.0  # Shortest length (m) of such a wall.
 
 Scene = namedtuple(
     "Scene",
-    "U V order z weight shade n low high turn depth corner_u corner_v pitch lines vertices corners "
-    "leans evidence dead width allowed",
+    "U V order z weight shade n low high turn depth corner_u corner_v pitch lines vertices leans "
+    "evidence dead width allowed",
 )
 """A building as the search sees it.
 
@@ -53,7 +53,6 @@ Scene = namedtuple(
 - depth (a, b): signed depth inside the outline on a raster of the first direction, which begins at
   (corner_u, corner_v) with a node every `pitch` metres.
 - lines, vertices: places for an edge, by direction and axis, padded with infinity.
-- corners (directions, c, 2): the outline's vertices.
 - leans (directions, 2, m): of walls not quite along an axis, x = offset + lean y, padded.
 - evidence: the points that a unit of structure must explain.
 - dead, width: a point costs min((max(|dz| - dead, 0) / width)^2, 1).
@@ -130,7 +129,6 @@ def make_scene(
         pitch,
         make_lines(plan, corners),
         list_vertices(corners),
-        corners,
         list_leans(corners),
         evidence,
         DEAD_M,

@@ -42,9 +42,9 @@ def find_volumes(
     # Otherwise, the search of a house uses every point.
     if outline.area > LARGE_ROOF_M2 and count > SEARCH_POINTS:
         volumes = find_in_blocks(plan, outline, full_scene)
-        return volumes, compute_objective(volumes, full_scene, np.inf), full_scene
+        return volumes, compute_objective(volumes, full_scene), full_scene
     scene = thin_scene(full_scene, numbers, evidence[0])
     volumes, _ = grow(scene)
-    value = compute_objective(volumes, full_scene, np.inf)
+    value = compute_objective(volumes, full_scene)
     volumes, value = refit_volumes(volumes, full_scene, value)
     return *trim(volumes, full_scene, value), full_scene

@@ -43,8 +43,8 @@ def trim(volumes: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray, f
         visible = top == number
         if not visible.any():
             trial = remove_volume(volumes, k)
-            trial_value = compute_objective(trial, scene, value + 1e-9)
-            if np.isfinite(trial_value):
+            trial_value = compute_objective(trial, scene)
+            if trial_value <= value + 1e-9:
                 volumes, value = trial, trial_value
                 continue
         else:
@@ -70,8 +70,8 @@ def draw_out(volumes: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarra
     for k, edge in np.argwhere(nearest[1:] < NEAR_VERTEX_M) + (1, 0):
         trial = volumes.copy()
         trial[k, U0 + edge] += OUTWARDS[edge % 2] * nearest[k, edge]
-        trial_value = compute_objective(trial, scene, value + SLACK_UNITS * scene.evidence)
-        if np.isfinite(trial_value):
+        trial_value = compute_objective(trial, scene)
+        if trial_value <= value + SLACK_UNITS * scene.evidence:
             volumes, value = trial, trial_value
     return volumes, value
 
@@ -101,11 +101,11 @@ def draw_in(
         trial[k, edge] = place
         if not has_width(trial[k]):
             continue
-        trial_value = compute_objective(trial, scene, value + SLACK_UNITS * scene.evidence)
-        if np.isfinite(trial_value):
+        trial_value = compute_objective(trial, scene)
+        if trial_value <= value + SLACK_UNITS * scene.evidence:
             return trial, trial_value
         if not changes_heights(volumes, trial, k, edge, U, V):
-            return trial, compute_objective(trial, scene, np.inf)
+            return trial, trial_value
     return volumes, value
 
 

@@ -66,7 +66,6 @@ def open_window(whole: Whole, box: Box, most_points: int) -> Scene | None:
         corner_v=corner[1],
         lines=pad_rows(lines),
         vertices=list_vertices(corners),
-        corners=corners,
         leans=list_leans(corners),
         evidence=share * scene.evidence,
     )
