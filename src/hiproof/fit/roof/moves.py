@@ -373,8 +373,8 @@ def apply_move(roof, move, site, changed):
     elif kind == MERGE:
         is_possible = roof.n_planes[b] > 0 and merge(roof, a, b, site, d)
         changed[b] = True
-        if is_possible and c:
-            face_planes(roof, a, c, site)
+        if is_possible and c:  # the same merge, if no plane turns
+            is_possible = face_planes(roof, a, c, site)
     elif kind == FACE:
         is_possible = face_planes(roof, a, b, site)
     elif kind == TURN:
