@@ -44,15 +44,15 @@ def make_drawing(volumes: int) -> Drawing:
     """Return room for the drawing of so many volumes."""
     return Drawing(
         np.zeros(1, np.int64),
-        np.zeros((MOST_FRAGMENTS, RING_CORNERS, 2)),
-        np.zeros(MOST_FRAGMENTS, np.int64),
-        np.zeros((MOST_FRAGMENTS, 2), np.int64),
-        np.zeros((volumes, VOLUME_PLANES), np.int64),
-        np.zeros((MOST_FRAGMENTS, 4)),
-        np.zeros((5, RING_CORNERS, 2)),
-        np.zeros((N_SIDES + VOLUME_PLANES, 3)),
-        np.zeros((2 * PIECE_ROOM, RING_CORNERS, 2)),
-        np.zeros((2 * PIECE_ROOM, 2), np.int64),
+        np.empty((MOST_FRAGMENTS, RING_CORNERS, 2)),
+        np.empty(MOST_FRAGMENTS, np.int64),
+        np.empty((MOST_FRAGMENTS, 2), np.int64),
+        np.empty((volumes, VOLUME_PLANES), np.int64),
+        np.empty((MOST_FRAGMENTS, 4)),
+        np.empty((5, RING_CORNERS, 2)),
+        np.empty((N_SIDES + VOLUME_PLANES, 3)),
+        np.empty((2 * PIECE_ROOM, RING_CORNERS, 2)),
+        np.empty((2 * PIECE_ROOM, 2), np.int64),
     )
 
 
