@@ -46,7 +46,8 @@ from .tables import (
     MAKE_LEVEL,  # plane b of volume a becomes level
     ADD_BAY,  # a level volume over bay a of the outline
     ONE_PLANE,  # plane b of volume a becomes plane d of volume c
-    COVER,  # side b of volume a on line c of the outline, with all planes from its walls' eaves
+    COVER,  # side b of volume a on line c of the outline, with all planes from its walls' eaves,
+    # and one more from that line if d
     TO_EAVE,  # plane b of volume a rises from height c, and so does the side that it faces
     TO_POINTS,  # side b of volume a where points say that it ends, as it leans
 ) = range(18)
@@ -261,6 +262,7 @@ def list_side_moves(roof, site, k, moves, count):
                 and line[0] * x + line[1] * y + line[2] > COVER_M
             ):
                 count = write_move(moves, count, COVER, k, s, m + 1, 0)
+                count = write_move(moves, count, COVER, k, s, m + 1, 1)
     return count
 
 
@@ -390,9 +392,7 @@ def apply_move(roof, move, site, changed):
         if is_possible:
             roof.sides[a, b] = add_line(roof, d, e, f, LEAN_UNITS)
     elif kind == COVER:
-        roof.sides[a, b] = find_new_side(roof, TO_OUTLINE, a, b, c, site)
-        place_volume(roof, a)
-        is_possible = level_eaves(roof, a, 1, 1, site)
+        is_possible = cover(roof, a, b, c, d, site)
     elif kind == LEVEL_EAVES:
         is_possible = level_eaves(roof, a, b, c, site)
     else:
@@ -633,6 +633,21 @@ def level_eaves(roof, k, one_slope, walls, site):
             if cuts_corner(roof, k, line):
                 signed = add_line(roof, line[0], line[1], line[2])
                 add_plane(roof, k, signed, height, slope)
+    return True
+
+
+@compiled
+def cover(roof, k, s, number, with_end, site):
+    """Draw side s of volume k out to a wall, perhaps with a plane from there. Returns if it can."""
+    roof.sides[k, s] = find_new_side(roof, TO_OUTLINE, k, s, number, site)
+    place_volume(roof, k)
+    a, b, _ = read_line(roof, roof.sides[k, s])
+    if (with_end and is_faced(roof, k, a, b)) or not level_eaves(roof, k, 1, 1, site):
+        return False
+    for p in range(roof.n_planes[k] if with_end else 0):
+        if roof.slopes[k, p] >= 0:
+            add_plane(roof, k, roof.sides[k, s], roof.heights[k, p], roof.slopes[k, p])
+            break
     return True
 
 
