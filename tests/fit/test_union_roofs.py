@@ -100,17 +100,19 @@ def test_pitches_and_eaves_that_differ_are_found_within_the_allowance(shape):
 
 @pytest.mark.parametrize("type", ["pyramid", "half_hip", "asymmetric_gable", "gambrel", "shed"])
 def test_the_catalogues_other_shapes_are_found_again(type):
-    rng = np.random.default_rng(3)
-    building = random_building(rng, type)
-    xy = scatter(building.outline, rng)
-    z = building.roof.height_at(xy)
-    fit = fit_building(np.column_stack([xy, z]), building.outline)
-    (truth,) = building.roof.parts
-    assert [part.type for part in fit.roof_parts] in [
-        [name] for name in list_right_types(truth, hidden=False)
-    ]
-    assert np.mean(np.abs(measure_height(fit, xy) - z) < DEAD_M) > 0.9
-    assert np.median(np.abs(measure_height(fit, xy) - z)) < 0.01
+    right = 0
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        building = random_building(rng, type)
+        xy = scatter(building.outline, rng)
+        z = building.roof.height_at(xy)
+        fit = fit_building(np.column_stack([xy, z]), building.outline)
+        (truth,) = building.roof.parts
+        gaps = np.abs(measure_height(fit, xy) - z)
+        types = [part.type for part in fit.roof_parts]
+        is_named = types in [[name] for name in list_right_types(truth, hidden=False)]
+        right += is_named and np.mean(gaps < DEAD_M) > 0.9 and np.median(gaps) < 0.01
+    assert right >= 9
 
 
 def is_right(building, fit):

@@ -47,7 +47,7 @@ from .tables import (
     ADD_BAY,  # a level volume over bay a of the outline
     ONE_PLANE,  # plane b of volume a becomes plane d of volume c
     COVER,  # side b of volume a on line c of the outline, with all planes from its walls' eaves,
-    # and one more from that line if d
+    # and one more from that line, as at its other end, if d
     TO_EAVE,  # plane b of volume a rises from height c, and so does the side that it faces
     TO_POINTS,  # side b of volume a where points say that it ends, as it leans
 ) = range(18)
@@ -638,11 +638,14 @@ def level_eaves(roof, k, one_slope, walls, site):
 
 @compiled
 def cover(roof, k, s, number, with_end, site):
-    """Draw side s of volume k out to a wall, perhaps with a plane from there. Returns if it can."""
+    """Draw side s of volume k out to a wall, perhaps to end there as its other end does."""
     roof.sides[k, s] = find_new_side(roof, TO_OUTLINE, k, s, number, site)
     place_volume(roof, k)
     a, b, _ = read_line(roof, roof.sides[k, s])
-    if (with_end and is_faced(roof, k, a, b)) or not level_eaves(roof, k, 1, 1, site):
+    c, d, _ = read_line(roof, roof.sides[k, s ^ 1])
+    if with_end and (is_faced(roof, k, a, b) or not is_faced(roof, k, c, d)):
+        return False
+    if not level_eaves(roof, k, 1, 1, site):
         return False
     for p in range(roof.n_planes[k] if with_end else 0):
         if roof.slopes[k, p] >= 0:
