@@ -47,7 +47,7 @@ def moves() -> None:
     from ...fit.union.volumes import make_base
 
     scene, base = make_house_scene()[1], make_base(-3.0)
-    value = compute_objective(base, scene, np.inf)
+    value = compute_objective(base, scene)
     improve(base, scene, value, np.array([0.7]), 1)
     fit_building(house(), L_OUTLINE)
     centre, _ = find_disc(house(), np.zeros(2), 1.0)  # a house so simple asks for none
