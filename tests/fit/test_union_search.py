@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hiproof.fit.union.add import NOTHING_LEFT, ROOF_IS_KNOWN, add_volumes, find_best_addition
+from hiproof.fit.union.add import NOTHING_LEFT, ROOF_IS_KNOWN, add_candidates, find_best_addition
 from hiproof.fit.union.around import (
     compute_roof_everywhere,
     compute_roof_with,
@@ -559,7 +559,7 @@ def test_an_addition_is_one_volume_more_for_less(seed):
         assert len(extended) == len(start) + 1
         assert result < value
         assert is_true(extended, scene, result)
-        end = add_volumes(start, value, ground, candidates, 1, 0, 0.0)
+        end = add_candidates(start, value, ground, candidates, 1, 0, 0.0)
         assert end[1] <= result + 1e-9
         assert end[2:] == (NOTHING_LEFT, 0)
     assert find_best_addition(volumes, value, ground, candidates[:0])[1] == np.inf
@@ -571,8 +571,8 @@ def test_adding_ends_where_a_known_roof_comes_back(seed):
     ground, candidates = prepare_grid(scene)
     base = make_base(float(scene.z.min()))
     value = compute_objective(base, scene)
-    volumes, result, end, remainder = add_volumes(base, value, ground, candidates, 1, 0, 0.0)
-    second = add_volumes(base, value, ground, candidates, 5, len(volumes), result)
+    volumes, result, end, remainder = add_candidates(base, value, ground, candidates, 1, 0, 0.0)
+    second = add_candidates(base, value, ground, candidates, 5, len(volumes), result)
     assert len(volumes) > 1
     assert (end, remainder) == (NOTHING_LEFT, 0)
     assert second[2] == ROOF_IS_KNOWN

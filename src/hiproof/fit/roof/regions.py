@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from ...geometry.rings import OVERLAY_GRID_M, with_area
+from ...geometry.rings import intersect, subtract, unite
 from ..shapes.clamp import clip_ring
 from ..shapes.regions import find_neighbour, list_polygons, widen_gap
 from .draw import Drawing, join_fragments
@@ -45,9 +45,9 @@ def list_places(
         owner = max(owners, key=lambda k: sum(p.area for p in regions[k]))
         whole = [p for k in owners for p in regions[k]]
         if len(owners) > 1:
-            whole = list_polygons(shapely.union_all(whole, grid_size=OVERLAY_GRID_M))
+            whole = list_polygons(unite(whole))
         areas = [unite_fragments(drawing, fragments) for fragments in places_of_one.values()]
-        apart = list_polygons(shapely.union_all(areas, grid_size=OVERLAY_GRID_M))
+        apart = list_polygons(unite(areas))
         inside = max(len(areas), len(apart)) > 1 and is_inside(visible, owner)
         large = [area for area in (apart if inside else areas) if area.area > LEAST_PLACE_M2]
         if len(large) < 2 or (not inside and crosses(visible, owner, large)):
@@ -66,8 +66,7 @@ def draw_visible(drawing: Drawing) -> dict[int, shapely.Geometry]:
 
 
 def unite_fragments(drawing: Drawing, numbers: list[int]) -> shapely.Geometry:
-    rings = [shapely.Polygon(drawing.rings[f, : drawing.sizes[f]]) for f in numbers]
-    return shapely.union_all(rings, grid_size=OVERLAY_GRID_M)
+    return unite([shapely.Polygon(drawing.rings[f, : drawing.sizes[f]]) for f in numbers])
 
 
 def is_inside(visible: dict[int, shapely.Geometry], k: int) -> bool:
@@ -110,8 +109,7 @@ def split_region(
         for g in inside:
             others = shapely.union_all([places[h] for h in inside if h != g])
             reach = shapely.buffer(places[g], BELOW_M, join_style="mitre")
-            cut = with_area(shapely.intersection(polygon, reach, grid_size=OVERLAY_GRID_M))
-            parts[g] += list_polygons(subtract(cut, others))
+            parts[g] += list_polygons(subtract(intersect(polygon, reach), others))
     return parts
 
 
@@ -134,17 +132,14 @@ def draw_regions(roof: Tables, outline: shapely.Polygon) -> list[list[shapely.Po
                     region = subtract(region, quad)
             regions[k] = region
     lists = [list_polygons(region) for region in regions]
-    bare = shapely.difference(
-        outline, shapely.union_all(quads, grid_size=OVERLAY_GRID_M), grid_size=OVERLAY_GRID_M
-    )
+    bare = subtract(outline, unite(quads))
     gaps: dict[tuple[int, int], list[shapely.Polygon]] = {}
     for gap in map(widen_gap, list_polygons(bare)):
         gaps.setdefault(find_neighbour(gap, lists), []).append(gap)
     for k, q in sorted(gaps, reverse=True):  # the last polygon first: the others stay in place
         if lists[k]:
-            wider = shapely.union_all([lists[k][q], *gaps[k, q]], grid_size=OVERLAY_GRID_M)
-            inside = shapely.intersection(with_area(wider), outline, grid_size=OVERLAY_GRID_M)
-            lists[k][q : q + 1] = list_polygons(inside)
+            wider = unite([lists[k][q], *gaps[k, q]])
+            lists[k][q : q + 1] = list_polygons(intersect(wider, outline))
     return lists
 
 
@@ -162,8 +157,7 @@ def draw_quad(roof: Tables, k: int, outline: shapely.Polygon) -> shapely.Geometr
         ring = clip_ring(ring, *roof.half_planes[k, s].tolist())
     if len(ring) < 3:
         return shapely.Polygon()
-    cut = shapely.intersection(shapely.Polygon(ring), outline, grid_size=OVERLAY_GRID_M)
-    return with_area(cut)
+    return intersect(shapely.Polygon(ring), outline)
 
 
 def is_below(roof: Tables, j: int, k: int, quad: shapely.Geometry) -> bool:
@@ -180,7 +174,3 @@ def compute_heights(roof: Tables, k: int, xy: np.ndarray) -> np.ndarray:
     """Return the heights (n,) of volume k at places (n, 2), whatever its sides."""
     rows = roof.planes[k, : roof.n_planes[k]]
     return (xy @ rows[:, :2].T + rows[:, 2]).min(axis=1)
-
-
-def subtract(region: shapely.Geometry, hole: shapely.Geometry) -> shapely.Geometry:
-    return with_area(shapely.difference(region, hole, grid_size=OVERLAY_GRID_M))

@@ -54,7 +54,7 @@ GrowthGrid = namedtuple("GrowthGrid", "scene cell_u cell_v slopes")
 
 
 @compiled
-def add_volumes(volumes, value, ground, candidates, additions, known_count, known_value):
+def add_candidates(volumes, value, ground, candidates, additions, known_count, known_value):
     """Add at most `additions` volumes, as long as a candidate helps.
 
     Returns the volumes, their objective, how it ended, and how many may still be added. It also

@@ -13,7 +13,7 @@ from .add import (
     NOTHING_LEFT,
     ROOF_IS_KNOWN,
     GrowthGrid,
-    add_volumes,
+    add_candidates,
     find_unexplained,
 )
 from .candidates import (
@@ -104,7 +104,7 @@ def grow_volumes(
     scene, remaining, is_new = ground.scene, MOST_ADDITIONS, False
     while remaining > 0:
         n_before = remaining
-        volumes, value, end, remaining = add_volumes(
+        volumes, value, end, remaining = add_candidates(
             volumes, value, ground, candidates, remaining, *known_roof
         )
         if end == ROOF_IS_KNOWN:
