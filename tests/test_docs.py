@@ -167,7 +167,7 @@ def test_the_sites_generated_pages_tell_every_command_option_and_setting():
         ("hiproof", "'torch', 'dask', 'numba', 'scipy', 'onnxruntime'"),
         (
             "hiproof.city.run, hiproof.city.work.solve, hiproof.fit.union",
-            "'dask', 'scipy.ndimage', 'scipy.optimize', 'scipy.spatial', "
+            "'dask', 'scipy.ndimage', 'scipy.optimize', 'scipy.sparse', 'scipy.spatial', "
             "'scipy.special', 'onnxruntime', 'rasterio', 'xml.etree'",
         ),
         ("hiproof.classify.split", "'scipy.ndimage', 'scipy.spatial'"),

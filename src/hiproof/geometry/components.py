@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 
 def label_components(count: int, links: np.ndarray) -> np.ndarray:
@@ -16,5 +14,13 @@ def label_components(count: int, links: np.ndarray) -> np.ndarray:
     >>> label_components(5, np.array([[4, 3], [0, 2]]))
     array([0, 1, 2, 2, 0])
     """
-    graph = coo_array((np.ones(links.shape[1], bool), tuple(links)), shape=(count, count))
-    return connected_components(graph, directed=False)[1].astype(np.int64)
+    first = np.arange(count)
+    while True:
+        lowest = first.copy()
+        for ends in (links, links[::-1]):
+            np.minimum.at(lowest, first[ends[0]], first[ends[1]])
+        lowest = lowest[lowest]
+        lowest = np.minimum(lowest, lowest[first])
+        if np.array_equal(lowest, first):
+            return np.unique(first, return_inverse=True)[1]
+        first = lowest
