@@ -18,9 +18,9 @@ import shapely
 
 from ..compiled import compiled
 from ..geometry.arrays import copy_row, copy_rows, sort_values
+from ..geometry.grid import KEY_OF_CELL
 
 GRID_M = 1e-4  # m; how CityJSON is rounded, so that what is checked is what is written
-PLACE_KEY = np.array([2**32, 1])  # with which both coordinates of a place make one number
 OUTSIDE, UNCOVERED = -1, -2  # labels of faces that no plane covers
 # units of GRID_M, half a millimetre: a vertex nearer to its neighbours' line is none
 COLLINEAR_UNITS = 5.0
@@ -257,7 +257,7 @@ def trace_faces(xy: np.ndarray, edges: np.ndarray) -> HalfEdges:
     polygons = shapely.orient_polygons(shapely.get_parts(shapely.polygonize(lines)))
     rings, owner = shapely.get_rings(polygons, return_index=True)
     corners, ring = shapely.get_coordinates(rings, return_index=True)
-    vertex = look_up(xy @ PLACE_KEY, corners.astype(np.int64) @ PLACE_KEY)
+    vertex = look_up(xy @ KEY_OF_CELL, corners.astype(np.int64) @ KEY_OF_CELL)
     starts, ends = vertex[:-1], vertex[1:]
     keys = (starts * len(xy) + ends)[ring[:-1] == ring[1:]]
     face = np.zeros(len(origin), np.int64)

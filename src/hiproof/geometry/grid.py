@@ -6,6 +6,9 @@ import math
 
 import numpy as np
 
+# With which a column and a row make one number: as many rows as no grid of a world has.
+KEY_OF_CELL = np.array([2**32, 1])
+
 
 def number_cells(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Number the distinct cells among `cells` (n, 2), by column, then by row.

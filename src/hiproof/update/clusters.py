@@ -13,9 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..geometry.components import label_components
+from ..geometry.grid import KEY_OF_CELL
 from .cells import MEDIAN_VARIANCE, CellComparison
-
-KEY_OF_CELL = np.array([2**32, 1])  # with which a column and a row make one number
 
 CELL_SIGMAS = 3.3
 """Standard deviations from which on a cell's difference counts: by chance one in a thousand."""

@@ -19,13 +19,13 @@ import shapely
 from ..city.plan.work_plan import WorkPlan, load_plan
 from ..city.work.sort import sort_cloud
 from ..geometry.components import label_components
-from ..geometry.grid import number_cells
+from ..geometry.grid import KEY_OF_CELL, number_cells
 from ..model import PointCloud
 from ..settings import ReadSettings
 from ..status import ChangeKind
 from ..write.files import atomic, atomic_file
 from ..write.parameters import outline_record
-from .clusters import KEY_OF_CELL, ROUGH_M, is_strip, link_neighbours, measure_roughness
+from .clusters import ROUGH_M, is_strip, link_neighbours, measure_roughness
 from .plan import EARLIER_FOLDER
 
 OUTSIDE_FILE, CELLS_FOLDER = "outside.json", "cells"

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
+from ...geometry.grid import KEY_OF_CELL
 from ...geometry.point_in_polygon import find_inside
 from ...read.terrain import Terrain
 from ...status import Doubt
@@ -28,7 +29,6 @@ FEWEST_CELLS = 10  # with roof points, below which chance decides
 # of these, with ground points as well: of Delft's buildings none, of simulated ones pulled down
 # between two flights all
 UNDER_ROOF = 0.4
-ROWS = 2**32  # cells from north to south, more than a world has metres
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ def find_low_cells(points: OtherPoints, covered: np.ndarray) -> np.ndarray:
     """
     low = points.low[~np.isin(cell_numbers(points.low), list_cells(covered))]
     numbers = cell_numbers(low)
-    block = np.array([0, 1, ROWS, ROWS + 1])
+    block = np.array([(0, 0), (0, 1), (1, 0), (1, 1)]) @ KEY_OF_CELL
     corners = numbers[np.isin(numbers[:, None] + block, numbers).all(axis=1)]
     return low[np.isin(numbers, corners[:, None] + block)]
 
@@ -167,5 +167,4 @@ def list_cells(points: np.ndarray) -> np.ndarray:
 
 def cell_numbers(points: np.ndarray) -> np.ndarray:
     """Return the whole-metre cell (n,) of each of the points (n, 3), as a number."""
-    column, row = np.floor(points[:, :2]).astype(np.int64).T
-    return column * ROWS + row
+    return np.asarray(np.floor(points[:, :2]).astype(np.int64) @ KEY_OF_CELL)
