@@ -207,6 +207,19 @@ def test_a_model_stays_where_a_crown_hides_its_roof(run, tmp_path):
     assert after["parts"] == before["parts"]
 
 
+@pytest.mark.parametrize("rise", [0.25, 0.3, -0.35])
+def test_a_roof_that_moved_a_little_moved_as_a_whole(run, rise, tmp_path):
+    """Of its cells a quarter differs by more than chance: the others are too few points."""
+    town = make_town(seed=7)
+    town.xyz[town.classification == 6, 2] += rise
+    after = update(run, tmp_path / "out", town)
+    kind = "roof_raised" if rise > 0 else "roof_lowered"
+    assert {take_kind(row) for row in after.values()} == {kind}
+    for row in after.values():
+        (place,) = row["change"]["places"]
+        assert place["difference"] == pytest.approx(rise, abs=0.05)
+
+
 def test_most_houses_may_grow_while_the_survey_is_shifted(run, tmp_path):
     town = make_town(seed=7)
     for id in ("house-0", "house-1", "house-3"):
@@ -220,6 +233,28 @@ def test_most_houses_may_grow_while_the_survey_is_shifted(run, tmp_path):
     for id in raised:
         place = after[id]["change"]["places"][0]
         assert place["difference"] == pytest.approx(2.8, abs=0.05)
+
+
+@pytest.mark.parametrize("is_seen", [True, False], ids=["bare", "not covered"])
+def test_a_half_that_is_gone_is_no_unchanged_part_of_a_split(run, is_seen, tmp_path):
+    town = make_town(seed=7)
+    x0, y0, x1, y1 = town.footprints["house-0"].bounds
+    x, outlines = x0 + 0.5 * (x1 - x0), {**town.footprints}
+    lay_bare(town, "house-0", 0.5)
+    if not is_seen:
+        far = ~shapely.intersects_xy(shapely.box(x, y0, x1, y1), *town.xyz[:, :2].T)
+        town = dataclasses.replace(
+            town, xyz=town.xyz[far], classification=town.classification[far]
+        )
+    del outlines["house-0"]
+    outlines |= {"west": shapely.box(x0, y0, x, y1), "east": shapely.box(x, y0, x1, y1)}
+    path = str(write_footprints(tmp_path / "split.gpkg", outlines))
+    after = update(run, tmp_path / "out", town, footprints=path, id_attribute="id")
+    assert take_kind(after["west"]) == "split"
+    change = after["east"]["change"]
+    assert change["class"] == ("gone" if is_seen else "not_covered")
+    assert change["predecessors"] == ["house-0"]
+    assert [place["kind"] for place in change["places"]] == ["demolished"] * is_seen
 
 
 def test_copies_of_an_outline_are_the_same_building(run, tmp_path):

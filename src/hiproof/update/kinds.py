@@ -139,10 +139,11 @@ def name_whole(verdict: ChangeVerdict, inside: np.ndarray, sides: BeforeAfter) -
     c = sides.cells
     members = np.flatnonzero(c.is_compared)
     share = inside.sum() / len(members)
+    moved = find_moved(inside, c)
     pair = find_main(sides.part_before[members]), find_main(sides.part_after[members])
     kind, d = None, c.difference[members]
     if not verdict.clusters or (
-        share >= AS_ONE_SHARE and moves_together(d) and has_all(inside, sides)
+        moved[members].mean() >= AS_ONE_SHARE and moves_together(d) and has_all(moved, sides)
     ):
         kind = ChangeKind.ROOF_RAISED if np.median(d) > 0 else ChangeKind.ROOF_LOWERED
     elif (
@@ -157,6 +158,16 @@ def name_whole(verdict: ChangeVerdict, inside: np.ndarray, sides: BeforeAfter) -
     if kind is None:
         return None
     return describe_place(kind, np.isin(np.arange(len(c.cells)), members), pair, sides)
+
+
+def find_moved(inside: np.ndarray, comparison: CellComparison) -> np.ndarray:
+    """Return whether (k,) each cell moved like most of those `inside` (k,) all clusters.
+
+    The differences of many cells are too small to count by themselves.
+    """
+    d = comparison.difference
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.abs(d - np.median(d[inside])) < np.abs(d)) if inside.any() else inside
 
 
 def has_all(inside: np.ndarray, sides: BeforeAfter) -> bool:

@@ -343,7 +343,7 @@ class Updater:
         """Return the building of a new footprint that is no earlier building."""
         new = self.reconstruct(job, member)
         if new.built is None:
-            return new
+            return self.end_predecessors(job, member, new)
         if not member.predecessors:
             is_bare = self.was_bare(job)
             return self.mark(new, Change.NEW, 0.0, place_new(new, is_bare), member)
@@ -351,6 +351,15 @@ class Updater:
         kind = ChangeKind.SPLIT if one else ChangeKind.MERGED
         place = Difference(kind, math.nan, math.nan, job.area.area, job.area, (-1, 0))
         return self.mark(new, Change.CHANGED, 1.0, record_places([place]), member)
+
+    def end_predecessors(self, job: Job, member: UpdateMember, new: Building) -> Building:
+        """Return a `new` building without a model, over outlines that were merged or split."""
+        if not member.predecessors or self.was_bare(job):
+            return new
+        if not lies_on_ground(new):
+            return self.mark(new, Change.NOT_COVERED, 1.0, [], member)
+        place = Difference(ChangeKind.DEMOLISHED, math.nan, math.nan, job.area.area, job.area)
+        return self.mark(new, Change.GONE, 0.0, record_places([place]), member)
 
     def was_bare(self, job: Job) -> bool:
         """Return whether the earlier survey shows bare ground over most of an outline."""
@@ -367,8 +376,8 @@ class Updater:
         new = self.reconstruct(job, member)
         if new.built is None or new.status is Status.FROM_ATTRIBUTES:
             return build(member.record or {}, self.plan.settings.compose)
-        is_bare = earlier.status is Status.NO_BUILDING or Doubt.BARE_GROUND.value in earlier.detail
-        return self.mark(new, Change.NEW, 0.0, place_new(new, is_bare), member, [])
+        places = place_new(new, lies_on_ground(earlier))
+        return self.mark(new, Change.NEW, 0.0, places, member, [])
 
     def mark(
         self,
@@ -405,3 +414,8 @@ class Updater:
         if history:
             record["history"] = history
         return dataclasses.replace(building, change=record)
+
+
+def lies_on_ground(building: Building) -> bool:
+    """Return whether a building has no model because its outline lies bare."""
+    return building.status is Status.NO_BUILDING or Doubt.BARE_GROUND.value in building.detail
