@@ -243,9 +243,7 @@ def test_a_half_that_is_gone_is_no_unchanged_part_of_a_split(run, is_seen, tmp_p
     lay_bare(town, "house-0", 0.5)
     if not is_seen:
         far = ~shapely.intersects_xy(shapely.box(x, y0, x1, y1), *town.xyz[:, :2].T)
-        town = dataclasses.replace(
-            town, xyz=town.xyz[far], classification=town.classification[far]
-        )
+        town = dataclasses.replace(town, xyz=town.xyz[far], classification=town.classification[far])
     del outlines["house-0"]
     outlines |= {"west": shapely.box(x0, y0, x, y1), "east": shapely.box(x, y0, x1, y1)}
     path = str(write_footprints(tmp_path / "split.gpkg", outlines))

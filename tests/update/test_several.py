@@ -18,7 +18,7 @@ from hiproof.update.dates import choose_clouds
 from hiproof.update.request import UpdateRequest
 from hiproof.update.run import update_area
 from run_records import by_id, records
-from tiny_town import make_town, write_cloud, write_footprints
+from tiny_town import ORIGIN, make_town, write_cloud, write_footprints
 
 RAISED_M = 2.0
 YEARS = {"house-0": "1990", "house-1": "2019", "house-2": "1990", "house-3": "2019"}
@@ -67,6 +67,27 @@ def test_each_house_is_made_of_the_newest_survey_and_of_those_that_agree(houses)
     assert used["house-0"] == used["house-3"] == ("2020-05-01", both)
     assert used["house-1"] == ("2020-05-01", both[1:])
     assert used["house-2"] == ("2014", both[:1])
+
+
+def test_a_house_that_the_newest_survey_shows_pulled_down_has_no_older_model(tmp_path):
+    """Of another one half lies bare: the older survey shows it whole."""
+    first, second = make_town(), make_town(seed=7)
+    x0, y0, x1, y1 = first.footprints["house-0"].bounds
+    half = shapely.box((x0 + x1) / 2, y0, x1, y1)
+    for area in (half, first.footprints["house-2"]):
+        bare = shapely.intersects_xy(area, *second.xyz[:, :2].T)
+        second.xyz[bare, 2] = ORIGIN[2] + 0.01 * (second.xyz[bare, 0] - ORIGIN[0])
+        second.classification[bare] = 2
+    for name, town in (("2014", first), ("2020-05-01", second)):
+        (tmp_path / name).mkdir()
+        write_cloud(tmp_path / name / "tile.laz", town.xyz, town.classification)
+    write_footprints(tmp_path / "footprints.geojson", first.footprints)
+    found = run(tmp_path, tmp_path / "out")
+    assert [id for id, row in found.items() if not row.get("parts")] == ["house-2"]
+    assert "its ground lies bare" in found["house-2"]["detail"]
+    assert {found[id]["survey_date"] for id in ("house-0", "house-1", "house-3")} == {"2020-05-01"}
+    outline = shapely.Polygon(found["house-0"]["parts"][0]["outlines"][0][0])
+    assert outline.area == pytest.approx(half.area, rel=0.15)
 
 
 def test_points_of_both_surveys_count_and_lie_in_the_frame_of_the_newest(houses, surveys, tmp_path):

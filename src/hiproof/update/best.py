@@ -25,6 +25,8 @@ from ..city.work.solve import (
     solve_safely,
 )
 from ..city.work.surveys import SurveyPoints
+from ..fit.bare_ground import LEAST_LOST_M2
+from ..geometry.grid import count_cells
 from ..model import Building
 from ..parametric.override import Override
 from ..read.numbers import read_year
@@ -89,12 +91,15 @@ class TileSurveys:
         """Return the roof points (n, 3) of a building in a survey."""
         return select_roof(self.unite((name,)), job).points
 
+    def select_points(self, name: str, job: Job) -> np.ndarray:
+        """Return the points (n, 3) of a building and of bare ground in its outline in a survey."""
+        return select_points(self.unite((name,)), job)
+
     def is_same(self, job: Job, building: Building, name: str, other: str) -> bool:
         """Return whether another survey shows the roof that the survey `name` made."""
         roof = building.roof
         old, new = (
-            roof.frame.to_local(select_points(self.unite((survey,)), job))
-            for survey in (name, other)
+            roof.frame.to_local(self.select_points(survey, job)) for survey in (name, other)
         )
         steps = [self.shifts[survey] for survey in (name, other) if survey in self.shifts]
         shift = max(steps, key=lambda step: step.noise.roof, default=SurveyShift())
@@ -119,33 +124,39 @@ def solve_best(
     def solve() -> tuple[Building, Fragments]:
         attributes = job.footprint.attributes if job.footprint else {}
         year = read_year(attributes.get(plan.settings.read.year_column))
-        names = [name for name in surveys.names if year is None or int(name[:4]) >= year]
-        remark = "" if names else f"its year, {year}, is after that of every survey"
-        name, others = choose_survey(
-            {name: surveys.select_roof(name, job) for name in names or surveys.names}
-        )
+        known = [name for name in surveys.names if year is None or int(name[:4]) >= year]
+        remark = "" if known else f"its year, {year}, is after that of every survey"
+        names = known or surveys.names
+        roofs = {name: surveys.select_roof(name, job) for name in names}
+        name = choose_survey(roofs, {name: surveys.select_points(name, job) for name in names})
+        others = [other for other in names if other != name and len(roofs[other])]
         building, texts = solve_one(plan, job, surveys.unite((name,)), override, keep)
         if building.built is None:
             return building, texts
         used = (name, *(o for o in others if surveys.is_same(job, building, name, o)))
         if len(used) > 1:
             united, _ = solve_one(plan, job, surveys.unite(used), override, keep)
-            building, used = (building, used[:1]) if united.built is None else (united, used)
+            is_worse = united.built is None or adds_roof(united, building)
+            building, used = (building, used[:1]) if is_worse else (united, used)
         result = dataclasses.replace(building, survey_date=name, epochs_used=tuple(sorted(used)))
         return fragments(add_remark(result, remark), plan.list_names(job), plan.head)
 
     return solve_safely(plan, job, solve, keep)
 
 
-def choose_survey(points: dict[str, np.ndarray]) -> tuple[str, list[str]]:
-    """Return the newest survey that covers a roof well, and the others that show it.
+def adds_roof(united: Building, building: Building) -> bool:
+    """Return whether older points bring back what the newest survey shows as bare ground."""
+    areas = [other.roof.outline.area for other in (united, building)]
+    return areas[0] - areas[1] > LEAST_LOST_M2
 
-    `points` (n, 3) are those of the roof by survey, the newest first.
+
+def choose_survey(roofs: dict[str, np.ndarray], points: dict[str, np.ndarray]) -> str:
+    """Return the newest survey that shows a building well, or that it was pulled down.
+
+    Both hold points (n, 3) by survey, the newest first: those of `roofs`, and all that lie on a
+    roof or on bare ground inside the outline.
     """
-    cells = {
-        name: len(np.unique(np.floor(xyz[:, :2] / COVER_CELL_M), axis=0))
-        for name, xyz in points.items()
-    }
-    least = WELL_COVERED * max(cells.values())
-    name = next(name for name, count in cells.items() if count >= least)
-    return name, [other for other, count in cells.items() if other != name and count]
+    least = WELL_COVERED * max(count_cells(xyz[:, :2] // COVER_CELL_M) for xyz in roofs.values())
+    return next(
+        name for name, xyz in points.items() if count_cells(xyz[:, :2] // COVER_CELL_M) >= least
+    )
