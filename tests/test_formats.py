@@ -36,7 +36,7 @@ def test_a_format_has_what_its_kind_needs(name):
     module = import_format(format.module)
     assert callable(getattr(module, "writer", None) or module.write_models)
     if format.fragment:
-        assert callable(import_format(format.fragment).fragment) and module.writer
+        assert callable(import_format(format.fragment).writer.fragment) and module.writer
     else:
         assert not format.tile_ending
 
@@ -60,8 +60,9 @@ def test_models_by_work_tile_need_the_same_parts_of_buildings():
 class Names(BuildingWriter):
     """A format for this test: a line a building."""
 
-    def add(self, building, figures=None):
-        self.put(Fragment(f"{building.id}\n".encode()))
+    @staticmethod
+    def fragment(sheet):
+        return Fragment(f"{sheet.building.id}\n".encode())
 
     def put(self, fragment):
         self.file.write(fragment.text)
@@ -69,8 +70,7 @@ class Names(BuildingWriter):
 
 def test_one_line_makes_a_new_format_known_everywhere(tmp_path, monkeypatch):
     module = ModuleType("hiproof.write.names")
-    module.writer = lambda path, head: Names(path, head)
-    module.fragment = lambda sheet: Fragment(f"{sheet.building.id}\n".encode())
+    module.writer = Names
     monkeypatch.setitem(sys.modules, "hiproof.write.names", module)
     monkeypatch.setitem(
         formats.FORMATS, "names", Format("names.txt", "names alone", "names", "names")

@@ -16,11 +16,12 @@ from hiproof.city.plan.work_plan import WorkPlan, make_job
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.compose import check_solid
 from hiproof.errors import InputError, InputWarning
-from hiproof.frames import METRES
 from hiproof.model import CEILING, GROUND, Footprint
 from hiproof.parametric.override import overridden, read_override
 from hiproof.settings import Settings
 from hiproof.write import building_attributes, roof_figures
+from hiproof.write.fragments import Sheet
+from hiproof.write.head import FileHead
 from hiproof.write.meshes.viewed import view_building
 from hiproof.write.parameters import building_record
 from layers import write_layer
@@ -84,7 +85,7 @@ def test_every_file_is_valid_and_built_again(tmp_path, parts_as):
 
 def test_viewers_and_tables_get_the_passage():
     house = reconstruct((GATE, 3.0))
-    looks = view_building(house, {}, METRES).faces_by_look()
+    looks = view_building(Sheet(house, None, {}, FileHead())).faces_by_look()
     assert sum(map(len, looks.values())) == len(house.solid.faces)
     assert {look.name for look in looks} == {"roof gable", "WallSurface", "GroundSurface"}
     assert building_attributes(house)["hiproof_passages"] == 1

@@ -160,7 +160,7 @@ def test_coordinates_are_written_in_the_unit_of_the_crs_that_the_file_names(in_m
 def areas_to_load(out):
     """Areas in m2 of the roof surfaces as they would go into PostGIS."""
     run = open_run(out)
-    rows = [database_rows(described, run.head.units) for described in run.describe()]
+    rows = [database_rows(sheet) for sheet in run.describe()]
     return [values["area_m2"] for row in rows for _, values in row.roof_surfaces]
 
 

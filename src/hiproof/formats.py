@@ -7,9 +7,7 @@ format is a module and a table there. A module has either
     write_models(path, buildings, crs)  of 3D viewers, which draw a write.meshes.viewed.ViewedModel;
                                         returns how many it wrote
 
-and that of a file that a run writes has beside its writer
-
-    fragment(sheet)  a building's part of it (a write.fragments.Fragment), made in a worker
+The writer of a file that a run writes makes a building's part of it in a worker (`fragment`).
 
 Modules are imported when a file of theirs is asked for.
 """

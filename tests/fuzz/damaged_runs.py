@@ -26,8 +26,7 @@ from hiproof.errors import HiproofError
 from hiproof.log import LOGGER
 from hiproof.parametric.finished import load_postgis
 from hiproof.parametric.run import build_file
-from hiproof.write.described import Described
-from hiproof.write.naming import FileUnits
+from hiproof.write.fragments import Sheet
 from hiproof.write.tables.postgis import Load, database_rows
 from sample_parameters import write_parameters_of_each_kind
 
@@ -144,10 +143,8 @@ def view(folder: Path) -> None:
 def load(folder: Path) -> None:
     """All that is read for a database, and the values it would be sent."""
 
-    def send(
-        dsn: str, buildings: Iterable[Described], units: FileUnits, run: Load, damaged: Any
-    ) -> int:
-        texts = [database_rows(described, units).to_text() for described in buildings]
+    def send(dsn: str, buildings: Iterable[Sheet], run: Load, damaged: Any) -> int:
+        texts = [database_rows(sheet).to_text() for sheet in buildings]
         assert not any(b"\\u0000" in text for text in texts)
         return len(texts)
 

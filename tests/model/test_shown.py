@@ -22,7 +22,7 @@ from hiproof.model.shown import share_surface
 from hiproof.status import Status
 from hiproof.write import write_all
 from hiproof.write.building_attributes import osm_tags
-from hiproof.write.tables.rows import table_rows
+from hiproof.write.tables.rows import part_rows
 from roof_zoo import FRAME, KINDS, generate_roof
 
 SNAPPED_M = 0.05  # composing moves edges by less than this
@@ -119,7 +119,7 @@ def test_hidden_parts_do_not_make_a_roof_a_mixed_one(tmp_path):
 
 def test_rows_hold_where_a_part_shows_and_its_size_and_a_hidden_one_has_none():
     roof = Roof((flat(3.0, -5, -5, 20, 20), flat(2.0, 1, 1, 2, 2)), shapely.box(0, 0, 10, 5), FRAME)
-    ((geometry, values),) = table_rows(compose_building(roof), None, {}).parts
+    ((geometry, values),) = part_rows(compose_building(roof))
     x, y, _ = RD_ORIGIN
     assert (
         shapely.from_wkb(geometry).equals(shapely.box(x, y, x + 10, y + 5))

@@ -25,9 +25,7 @@ def street():
 def test_the_same_rows_as_the_geopackage(tmp_path, layer):
     pq = pytest.importorskip("pyarrow.parquet", reason="needs pyarrow, part of the extra `city`")
     write_attributes(tmp_path / "b.gpkg", street(), "EPSG:7415")
-    with GeoParquetWriter(tmp_path / "b.parquet", FileHead("EPSG:7415"), layer=layer) as writer:
-        for building in street():
-            writer.add(building)
+    GeoParquetWriter(tmp_path / "b.parquet", FileHead("EPSG:7415"), layer).add_all(street())
     table = pq.read_table(tmp_path / "b.parquet")
     meta, _, wkb, columns = pyogrio.raw.read(tmp_path / "b.gpkg", layer=layer)
     assert table.column_names == [*meta["fields"], "geometry"]
@@ -42,8 +40,8 @@ def test_the_same_rows_as_the_geopackage(tmp_path, layer):
 
 def test_an_attribute_called_geometry_stands_beside_the_outline(tmp_path):
     pq = pytest.importorskip("pyarrow.parquet", reason="needs pyarrow, part of the extra `city`")
-    with GeoParquetWriter(tmp_path / "b.parquet", FileHead("EPSG:7415")) as writer:
-        writer.add(make_building(gable_house(), attributes={"geometry": "poly", "Geometry": 1}))
+    house = make_building(gable_house(), attributes={"geometry": "poly", "Geometry": 1})
+    GeoParquetWriter(tmp_path / "b.parquet", FileHead("EPSG:7415")).add_all([house])
     (row,) = pq.read_table(tmp_path / "b.parquet").to_pylist()
     assert (row["geometry_2"], row["Geometry_3"]) == ("poly", 1)
     assert shapely.from_wkb(row["geometry"]).area == pytest.approx(96.0)

@@ -300,6 +300,5 @@ def test_a_building_in_parts_is_read_as_one_shell_at_every_level(tmp_path, lods,
 @pytest.mark.parametrize("kind", [CityGMLWriter, CityGML3Writer])
 def test_footprints_and_roof_edges_are_no_solids_to_be_checked(tmp_path, kind):
     head = FileHead("EPSG:7415", write=WriteSettings(lods=("0",)))
-    with kind(tmp_path / "a.gml", head) as writer:
-        writer.add(terrace())
+    kind(tmp_path / "a.gml", head).add_all([terrace()])
     assert list(read_solids(tmp_path / "a.gml")) == []

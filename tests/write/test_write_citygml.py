@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 from lxml import etree
 
 from handmade import RD_ORIGIN, box, courtyard, gable_house, make_building, make_lost_building
-from hiproof.write.citygml.version2 import NAMESPACES, CityGMLWriter, write_citygml
-from hiproof.write.head import FileHead
+from hiproof.write.citygml.version2 import NAMESPACES, write_citygml
 from hiproof.write.naming import gml_name
 from hiproof.write.values import xml_attribute, xml_text
 from written_run import require_schema
@@ -190,14 +189,6 @@ def test_far_away_and_under_water(tmp_path, schema, origin):
     root = write_and_read(tmp_path, [make_building(box(), origin=np.array(origin))])
     schema.assertValid(root.getroottree())
     assert find(root, "//bldg:measuredHeight/text()") == ["3.0000"]
-
-
-def test_incremental_equals_whole(tmp_path):
-    write_citygml(tmp_path / "whole.gml", street(), "EPSG:7415")
-    with CityGMLWriter(tmp_path / "steps.gml", FileHead("EPSG:7415")) as writer:
-        for building in street():
-            writer.add(building)
-    assert (tmp_path / "whole.gml").read_bytes() == (tmp_path / "steps.gml").read_bytes()
 
 
 @pytest.mark.parametrize("id", ["a", "ä", "1", " ", "", "<&>", "x" * 300, "a:b", "\n"])

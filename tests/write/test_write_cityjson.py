@@ -12,8 +12,7 @@ import shapely
 
 from handmade import RD_ORIGIN, box, courtyard, gable_house, make_building, make_lost_building
 from hiproof.model import GROUND, ROOF
-from hiproof.write.cityjson.features import CityJSONWriter, write_cityjson
-from hiproof.write.head import FileHead
+from hiproof.write.cityjson.features import write_cityjson
 
 SHARED = Path(__file__).parents[3] / "shared"
 FOOTPRINT = shapely.Polygon([(85000, 446000), (85000, 446009), (85009, 446009), (85009, 446000)])
@@ -207,14 +206,6 @@ def test_an_added_building_leaves_the_others_as_they_were(tmp_path):
         [*street()[2:], make_building(box(), "far", origin=np.array([88123.0, 449000.0, 0.0]))],
     )
     assert new[1:-1] == old[1:]
-
-
-def test_incremental_equals_whole(tmp_path):
-    sequence(tmp_path, street())
-    with CityJSONWriter(tmp_path / "b.city.jsonl", FileHead("EPSG:7415")) as writer:
-        for building in street():
-            writer.add(building)
-    assert (tmp_path / "a.city.jsonl").read_bytes() == (tmp_path / "b.city.jsonl").read_bytes()
 
 
 def test_a_measuring_tool_reads_it(tmp_path):

@@ -61,7 +61,7 @@ def convert_models(
 ) -> tuple[str, SkippedBuildings]:
     """Write the models of `source` to `path`; returns the result in a line and the damage."""
     from ..parametric.finished import open_run
-    from ..write.described import write_format
+    from ..write.run_files import write_format
 
     left_out = SkippedBuildings()
     run = open_run(source, crs)

@@ -11,9 +11,9 @@ import shapely
 from ..extras import import_extra
 from ..model import Building
 from ..parametric.finished import Run
-from ..write.building_attributes import building_attributes, measure_figures
+from ..write.building_attributes import measure_figures
 from ..write.colours import srgb
-from ..write.described import Described
+from ..write.fragments import Sheet, describe
 from ..write.head import FileHead
 from ..write.meshes.triangles import faces_triangles
 from ..write.naming import plan_wkt
@@ -75,23 +75,18 @@ def to_geodataframe(models: Run | Building | Iterable[Building], crs: Any = None
     geopandas = import_extra("geopandas", "geopandas", "data frames")
     head = models.head if isinstance(models, Run) else FileHead(crs)
     rows = [
-        building_row(building, attributes, head.units.table)
-        for building, _, attributes in describe_models(models, head)
+        building_row(sheet.building, sheet.attributes, head.units.table)
+        for sheet in describe_models(models, head)
     ]
     geometry = shapely.from_wkb(np.array([wkb for wkb, _ in rows], dtype=object))
     values = [row for _, row in rows]
     return geopandas.GeoDataFrame(values, geometry=geometry, crs=plan_wkt(head.crs_of_files))
 
 
-def describe_models(
-    models: Run | Building | Iterable[Building], head: FileHead
-) -> Iterator[Described]:
+def describe_models(models: Run | Building | Iterable[Building], head: FileHead) -> Iterator[Sheet]:
     """Yield buildings with their attributes."""
     if isinstance(models, Run):
         yield from models.describe()
         return
     for building in [models] if isinstance(models, Building) else models:
-        figures = measure_figures(building)
-        units, osm = head.units.gml, head.write.osm_tags
-        attributes = building_attributes(building, figures, head.prefix, units, osm)
-        yield Described(building, figures, attributes)
+        yield describe(building, measure_figures(building), head)

@@ -66,8 +66,8 @@ def measure(name: str, kind: str, type: str, unit: str, value: float | None) -> 
 def write_zone(sheet: Sheet, measures: str) -> str:
     """Return a building as one thermal zone, heated unless it is a shed or a garage."""
     name = sheet.gml_name
-    own = choose_solid(sheet)  # that of LoD2.3 has other faces
-    has_solid = sheet.head.write.has_lod2 and (own is None or own is sheet.building.solid)
+    own, _ = choose_solid(sheet) or (sheet.building.solid, None)  # that of LoD2.3 has other faces
+    has_solid = sheet.head.write.has_lod2 and own is sheet.building.solid
     is_heated = str(is_house(sheet.building)).lower()
     text = f'<energy:thermalZone><energy:ThermalZone gml:id="zone-{name}">{measures}'
     text += "<energy:isCooled>false</energy:isCooled>"

@@ -25,19 +25,19 @@ from ..city.work.cores import as_many_as_pay
 from ..city.work.executors import make_executor
 from ..errors import HiproofError, InputError, InputWarning, OutputError, report_error
 from ..evaluate.run import list_run_inputs, run_record
-from ..formats import FORMATS, import_format, list_requested_files, requested_fragments
+from ..formats import FORMATS, list_requested_files, requested_fragments
 from ..log import LOGGER
 from ..masking import masked_values
 from ..model import Building
 from ..settings import EnrichSettings, Settings
 from ..status import Status
 from ..write.attribute_list import OWN
-from ..write.building_attributes import building_attributes, measure_figures
+from ..write.building_attributes import measure_figures
 from ..write.cityjson.features import choose_offset
 from ..write.files import atomic_file, refuse_overwriting, save_text
-from ..write.fragments import Fragment, Fragments, Sheet, load_fragments, save_fragments
+from ..write.fragments import Fragment, Fragments, describe, load_fragments, save_fragments
 from ..write.head import FileHead
-from ..write.run_files import join_fragments
+from ..write.run_files import join_fragments, make_texts
 from ..write.values import plain_text
 from .answer import Answers, answer, is_residential
 from .cadastre import Cadastre, refuse_unfit, refuse_unusable
@@ -69,27 +69,18 @@ def make_fragments(
 ) -> Fragments:
     """Return the texts and answers of building `number`, or its failure as an attribute."""
     result, failure = answer_or_fail(town, number, settings, cadastre)
-    building, figures = result.building, measure_figures(result.building)
-    attributes = building_attributes(
-        building, figures, head.prefix, head.units.gml, head.write.osm_tags
-    )
-    sheet = Sheet(
-        building,
-        figures,
-        attributes | result.attributes,
-        plain_text(building.id),
-        town.records.name_in_gml(number),
-        head,
-        result.surfaces,
-    )
+    building = result.building
+    names = plain_text(building.id), town.records.name_in_gml(number)
+    plain = describe(building, measure_figures(building), head, *names)
+    attributes = plain.attributes | result.attributes
+    sheet = dataclasses.replace(plain, attributes=attributes, surfaces=result.surfaces)
     if settings.energy_ade:
         sheet = dataclasses.replace(sheet, extension=write_energy(sheet))
-    texts = {
-        kind: import_format(kind).fragment(sheet)
-        for kind in requested_fragments(head.write)
-        if kind not in NOT_MADE
+    kinds = (kind for kind in requested_fragments(head.write) if kind not in NOT_MADE)
+    return {
+        **make_texts(sheet, kinds),
+        FAILURE: Fragment(json.dumps(failure).encode() if failure else b""),
     }
-    return {**texts, FAILURE: Fragment(json.dumps(failure).encode() if failure else b"")}
 
 
 def answer_or_fail(

@@ -30,8 +30,8 @@ from ..read.models.damage import Damaged, refuse
 from ..read.models.solids import CITYGML_SUFFIXES, find_citygml_crs, read_building_solids
 from ..settings import ComposeSettings
 from ..status import Status
-from ..write.building_attributes import building_attributes, measure_figures
-from ..write.described import Described
+from ..write.building_attributes import measure_figures
+from ..write.fragments import Sheet, describe
 from ..write.head import FileHead
 from ..write.run_files import measure_or_drop_solid
 from ..write.values import plain, plain_text
@@ -62,9 +62,9 @@ class Run:
         return self.head.crs
 
     def __iter__(self) -> Iterator[Building]:
-        return (described.building for described in self.describe())
+        return (sheet.building for sheet in self.describe())
 
-    def describe(self, damaged: Damaged = refuse) -> Iterator[Described]:
+    def describe(self, damaged: Damaged = refuse) -> Iterator[Sheet]:
         """Yield every building with all that files need; `damaged` gets, or refuses, others."""
         if is_parameters(self.path):
             return describe_parametric(self.path, self.head, damaged)
@@ -113,24 +113,21 @@ def is_parameters(file: Path) -> bool:
         return False
 
 
-def describe_parametric(path: Path, head: FileHead, damaged: Damaged) -> Iterator[Described]:
+def describe_parametric(path: Path, head: FileHead, damaged: Damaged) -> Iterator[Sheet]:
     """Yield the buildings of a parameters.jsonl, each composed."""
     with opened_parameters(path, damaged) as (_, records):
         for record in records:
             if record is DAMAGED:
                 continue
             try:
-                building, figures = measure_or_drop_solid(build(record, head.compose))
+                measured = measure_or_drop_solid(build(record, head.compose))
             except HiproofError as error:
                 damaged(InputError(f"building {record['id']:.80} in {path}: {error}"))
                 continue
-            attributes = building_attributes(
-                building, figures, head.prefix, head.units.gml, head.write.osm_tags
-            )
-            yield Described(building, figures, attributes)
+            yield describe(*measured, head)
 
 
-def describe_solids(path: Path, head: FileHead, damaged: Damaged) -> Iterator[Described]:
+def describe_solids(path: Path, head: FileHead, damaged: Damaged) -> Iterator[Sheet]:
     """Yield the buildings of a file of solids, with the attributes that stand there.
 
     Those with the id of an earlier one are counted in a warning: a file may be joined of others.
@@ -146,7 +143,7 @@ def describe_solids(path: Path, head: FileHead, damaged: Damaged) -> Iterator[De
         except (ValueError, shapely.GEOSException) as error:
             damaged(InputError(f"expected a solid of {model.id:.80} in {path}, got: {error}"))
             continue
-        yield Described(building, figures, building.attributes)
+        yield Sheet(building, figures, building.attributes, head)
     if repeats := known.total() - len(known):
         warnings.warn(
             f"{mask(str(path))}: {count_things(repeats, 'building')} with an id given before; "
@@ -247,4 +244,4 @@ def load_postgis(
     code = (naming.reference_system(run.head.crs_of_files) or "").rpartition("/")[2]
     srid = int(code) if code.isdigit() and int(code) <= MOST_SRID else 0
     loaded = Load(name or place.name, str(place), prefix, srid, **how)
-    return load_tables(dsn, run.describe(damaged), run.head.units, loaded, damaged)
+    return load_tables(dsn, run.describe(damaged), loaded, damaged)

@@ -20,8 +20,7 @@ writer       a file is opened, given one building after another, finished
 files        files that appear whole or not at all, and stand for no input or run's own file
 head         what all files of a run have in common
 fragments    one building's texts, kept until they are joined
-described    a building with its attributes, into a file of any format
-run_files    all files of a run in one pass
+run_files    all files of a run in one pass, a file of any format
 """
 
 from ..model.roof_figures import RoofFigures, roof_figures

@@ -1,4 +1,4 @@
-"""The attributes of a building in every format: roofer's, our own, those of the input."""
+"""The attributes of a building and its parts: roofer's, our own, those of the input."""
 
 from __future__ import annotations
 
@@ -8,15 +8,19 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+import shapely
 
 from ..frames import METRES, Units
 from ..model import ROOF, Building, Solid
 from ..model.roof_figures import RoofFigures, find_ground_height, roof_figures
+from ..primitives.cants import CANTED, MEASURES, list_cants
 from ..primitives.catalogue import CATALOGUE
 from ..status import Status
-from .attribute_list import OWN, PREFIX, TABLES
+from .attribute_list import OWN, PREFIX, SHAPE, TABLES
 from .reprojected import Reprojected
 from .values import metres, plain, plain_text, round_value
+
+ROW_ENCODER = json.JSONEncoder(check_circular=False)  # a row cannot hold itself
 
 
 def measure_terrain(lines: tuple[np.ndarray, ...]) -> tuple[float, float, float] | None:
@@ -243,3 +247,38 @@ def check_as_written(solid: Solid, units: Units) -> str:
     )
     about_origin = Solid(there, solid.faces).move(-np.floor(there.min(axis=0)))
     return json.dumps(sorted({finding.code for finding in check_solid(about_origin)}))
+
+
+def part_values(building: Building, number: int, visible: shapely.Geometry) -> dict[str, Any]:
+    """Return a part's values: type, `visible` area, place, parameters, deviations."""
+    part = building.parts[number]
+    x, y, z = building.roof.frame.to_world(part.translation)
+    # Cants share a column: thirty columns that hardly a part fills would hide the others.
+    cants = list_cants(part.parameters)
+    rows = [
+        [round_value(part.parameters[f"{measure}_{cant}"]) for measure in MEASURES]
+        for cant in cants
+    ]
+    columns = {"t_z": "z_eave_sigma", "kappa": "rotation_sigma"} | {
+        name: f"{name}_sigma" for name in SHAPE
+    }
+    return {
+        "part": number,
+        "type": part.type,
+        "area_m2": metres(visible.area),
+        "x": metres(x),
+        "y": metres(y),
+        "z_eave": metres(z),
+        "rotation": round_value(math.degrees(part.kappa)),
+        **{
+            name: round_value(value)
+            for name, value in part.parameters.items()
+            if name not in CANTED
+        },
+        **({"cants": ROW_ENCODER.encode(rows)} if cants else {}),
+        **{
+            columns[name]: round_value(math.degrees(value) if name == "kappa" else value)
+            for name, value in part.sigma.items()
+            if name in columns
+        },
+    }

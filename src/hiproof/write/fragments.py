@@ -21,6 +21,7 @@ import numpy as np
 from ..errors import OutputError
 from ..model import Building, Solid
 from ..model.roof_figures import RoofFigures, roof_figures
+from .building_attributes import building_attributes
 from .head import FileHead
 from .shapes import Shapes, make_shapes
 
@@ -32,17 +33,17 @@ EXTENT, ENDS = ".extent", ".ends"
 class Sheet:
     """A building with all from which its texts are made.
 
-    It has the `figures` of its solid (None without one), its `attributes`, its names in CityJSON
-    and in GML, and what the files of its run have in common. `surfaces` are further attributes of
+    It has the `figures` of its solid (None without one), its `attributes`, what the files of its
+    run have in common, and its names in CityJSON and in GML. `surfaces` are further attributes of
     the solid's faces, by face; `extension` is what ends the building in CityGML 2.0.
     """
 
     building: Building
     figures: RoofFigures | None
     attributes: dict[str, Any]
-    name: str
-    gml_name: str
     head: FileHead
+    name: str = ""
+    gml_name: str = ""
     surfaces: dict[int, dict[str, Any]] = field(default_factory=dict)
     extension: str = ""
 
@@ -69,6 +70,20 @@ class Sheet:
 
         origin = model.roof.frame.origin
         return tuple(make_box(installation).move(origin) for installation in model.installations)
+
+
+def describe(
+    building: Building,
+    figures: RoofFigures | None,
+    head: FileHead,
+    name: str = "",
+    gml_name: str = "",
+) -> Sheet:
+    """Return the sheet of a building with the `figures` of its solid, and its attributes."""
+    attributes = building_attributes(
+        building, figures, head.prefix, head.units.gml, head.write.osm_tags
+    )
+    return Sheet(building, figures, attributes, head, name, gml_name)
 
 
 @dataclass(frozen=True)

@@ -34,7 +34,8 @@ class FileHead:
     of read.crs.NAMED_UNITS), the offset (3,) of the CityJSON file, None where its first building
     sets it, how solids are composed, what is written of buildings, what goes before roofer's
     attribute names, the date that CityGML gives its buildings, if any, and what an update found
-    beside its buildings, None for a run that is no update. `sky` names that of enriched buildings.
+    beside its buildings, None for a run that is no update. `sky` names that of enriched buildings,
+    `scale` is the grid to which CityJSON rounds coordinates, in its unit.
     """
 
     crs: Any = None
@@ -46,6 +47,7 @@ class FileHead:
     creation_date: datetime.date | None = None
     update: UpdateHead | None = None
     sky: str = ""
+    scale: float = 0.0001  # on which solids are composed
 
     @functools.cached_property
     def units(self) -> FileUnits:

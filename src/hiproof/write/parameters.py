@@ -19,7 +19,6 @@ import numpy as np
 import shapely
 
 from ..model import Building, Model, Part
-from ..model.roof_figures import RoofFigures
 from .attribute_list import TABLES
 from .fragments import Fragment, Sheet
 from .head import FileHead
@@ -42,36 +41,26 @@ def write_parameters(
     docs/attributes.md. All lengths are metres, `origin` too, also where the files' CRS counts in
     feet; angles are degrees. What cannot be told is null.
     """
-    ParametersWriter(path, head or FileHead(crs)).add_all(buildings)
+    with ParametersWriter(path, head or FileHead(crs)) as writer:
+        for building in buildings:
+            writer.put(Fragment(parameters_line(building)))
 
 
 class ParametersWriter(BuildingWriter):
     """Incremental form of `write_parameters`."""
 
-    def __init__(self, path: str | os.PathLike[str], head: FileHead | None = None) -> None:
-        super().__init__(path, head or FileHead())
-
     def begin(self, stack: ExitStack) -> None:
         self.file.write(dump(head_record(self.head)) + b"\n")
 
-    def add(
-        self,
-        building: Building,
-        figures: RoofFigures | None = None,
-        attributes: dict[str, Any] | None = None,
-    ) -> None:
-        self.put(Fragment(parameters_line(building)))
+    @staticmethod
+    def fragment(sheet: Sheet) -> Fragment:
+        return Fragment(parameters_line(sheet.building))
 
     def put(self, fragment: Fragment) -> None:
         self.file.write(fragment.text)
 
 
 writer = ParametersWriter
-
-
-def fragment(sheet: Sheet) -> Fragment:
-    """Return a building's line in a run's file."""
-    return Fragment(parameters_line(sheet.building))
 
 
 def head_record(head: FileHead) -> dict[str, Any]:

@@ -15,14 +15,16 @@ from typing import Any
 
 import numpy as np
 
-from ..formats import FORMATS, Format, import_format, list_requested_files, requested_fragments
+from ..formats import FORMATS, import_format, list_requested_files, requested_fragments
 from ..model import Building
 from ..model.roof_figures import RoofFigures
 from ..settings import Settings
 from ..status import Status
-from .building_attributes import building_attributes, measure_figures
-from .fragments import Fragments, Sheet
+from .building_attributes import measure_figures
+from .fragments import Fragments, Sheet, describe
 from .head import FileHead
+from .meshes.viewed import view_building
+from .parameters import crs_text
 from .writer import BuildingWriter
 
 
@@ -44,21 +46,40 @@ def write_all(
         # The table does most of its work at the end: entered last it is closed first, and its
         # failure stops the others.
         writers = [
-            stack.enter_context(make_writer(FORMATS[name], path, head))
-            for name, path in files.items()
+            stack.enter_context(make_writer(name, path, head)) for name, path in files.items()
         ]
-        for given_building in buildings:
-            building, figures = measure_or_drop_solid(given_building)
-            if building is not given_building:
-                broken.append(str(given_building.id))
+        for building in buildings:
+            sheet = describe(*measure_or_drop_solid(building), head)
+            broken += [] if sheet.building is building else [str(building.id)]
             for writer in writers:
-                writer.add(building, figures)
+                writer.add(sheet)
     return broken
 
 
-def make_writer(format: Format, path: Path, head: FileHead) -> BuildingWriter:
-    """Return the incremental writer of a file of a run."""
-    return import_format(format.module).writer(path, head, **format.given)
+def make_writer(name: str, path: Path, head: FileHead, **given: Any) -> BuildingWriter:
+    """Return the incremental writer of a file in the format of that name."""
+    format = FORMATS[name]
+    return import_format(format.module).writer(path, head, **format.given, **given)
+
+
+def write_format(
+    name: str, path: Path, sheets: Iterable[Sheet], head: FileHead, **given: Any
+) -> int:
+    """Write the buildings `sheets` to `path` in the format of that name; returns how many.
+
+    Formats of 3D viewers leave out buildings without a solid. Raises OutputError where `path`
+    cannot be written, and InputError for what the format cannot hold.
+    """
+    module = import_format(FORMATS[name].module)
+    if hasattr(module, "write_models"):
+        models = (view_building(sheet) for sheet in sheets if sheet.building.built is not None)
+        return module.write_models(path, models, crs_text(head.crs_of_files), **given)
+    count = 0
+    with make_writer(name, path, head, **given) as writer:
+        for sheet in sheets:
+            writer.add(sheet)
+            count += 1
+    return count
 
 
 def fragments(
@@ -70,13 +91,13 @@ def fragments(
     `head` what these have in common, the offset of the CityJSON file included. A solid that cannot
     be measured is left out, as in `write_all`.
     """
-    building, figures = measure_or_drop_solid(requested)
-    attributes = building_attributes(
-        building, figures, units=head.units.gml, osm=head.write.osm_tags
-    )
-    sheet = Sheet(building, figures, attributes, *names, head)
-    kinds = requested_fragments(head.write)
-    return building, {kind: import_format(kind).fragment(sheet) for kind in kinds}
+    sheet = describe(*measure_or_drop_solid(requested), head, *names)
+    return sheet.building, make_texts(sheet, requested_fragments(head.write))
+
+
+def make_texts(sheet: Sheet, kinds: Iterable[str]) -> Fragments:
+    """Return a building's texts by the module that makes them."""
+    return {kind: import_format(kind).writer.fragment(sheet) for kind in kinds}
 
 
 def join_fragments(files: dict[str, Path], parts: Iterable[Fragments], head: FileHead) -> None:
@@ -87,7 +108,7 @@ def join_fragments(files: dict[str, Path], parts: Iterable[Fragments], head: Fil
     """
     with ExitStack() as stack:
         opened = [
-            (stack.enter_context(make_writer(FORMATS[name], path, head)), FORMATS[name].fragment)
+            (stack.enter_context(make_writer(name, path, head)), FORMATS[name].fragment)
             for name, path in files.items()
         ]
         for part in parts:

@@ -12,8 +12,7 @@ from ..model import GROUND, Building, Face, Solid
 from ..model.roof_figures import RoofFigures, roof_figures
 from ..settings import WriteSettings
 from .attribute_list import OF_PARTS, OWN, PREFIX
-from .building_attributes import shape_attributes
-from .tables.rows import part_values
+from .building_attributes import part_values, shape_attributes
 from .values import metres, plain
 
 if TYPE_CHECKING:
@@ -121,48 +120,29 @@ def part_shapes(
     building: Building, cut: tuple[BuildingPart, ...], requested: set[str], prefix: str
 ) -> tuple[PartShape, ...]:
     """Return the building parts with what their roof parts are."""
-    primitives = [
-        part_values(building, number, visible)
-        for number, visible in enumerate(building.compute_visible_areas())
-    ]
-    return tuple(
-        part_shape(
-            part,
-            [primitives[member] for member in part.members if member < len(primitives)],
-            requested,
-            prefix,
-        )
-        for part in cut
-    )
-
-
-def part_shape(
-    part: BuildingPart, primitives: list[dict[str, Any]], requested: set[str], prefix: str
-) -> PartShape:
-    """Return a part of these roof parts with its figures, block and attributes."""
     from ..compose.blocks import block
 
-    figures = roof_figures(part.solid)
-    types = tuple(values["type"] for values in primitives)
-    lod13 = (
-        block(part.outline, figures.h_base, metres(figures.h_70p)) if "1.3" in requested else None
-    )
-    result = {
-        **shape_attributes(figures),
-        "roof_type": figures.roofer_type,
-        "roof_n_surfaces": figures.roof_faces,
-    }
-    return PartShape(
-        part.solid,
-        figures,
-        lod13,
-        types,
-        {
-            **{prefix + name: plain(result[name]) for name in OF_PARTS},
+    primitives = [
+        {name: plain(value) for name, value in part_values(building, number, visible).items()}
+        for number, visible in enumerate(building.compute_visible_areas())
+    ]
+    shapes = []
+    for part in cut:
+        figures = roof_figures(part.solid)
+        height = metres(figures.h_70p)
+        lod13 = block(part.outline, figures.h_base, height) if "1.3" in requested else None
+        own = [primitives[member] for member in part.members if member < len(primitives)]
+        types = tuple(values["type"] for values in own)
+        values = {
+            **shape_attributes(figures),
+            "roof_type": figures.roofer_type,
+            "roof_n_surfaces": figures.roof_faces,
+        }
+        attributes = {
+            **{prefix + name: plain(values[name]) for name in OF_PARTS},
             f"{OWN}h_eave": plain(metres(figures.h_eave)),
-            f"{OWN}roof_type": primitives[0]["type"] if primitives else None,
-            f"{OWN}primitives": [
-                {name: plain(value) for name, value in values.items()} for values in primitives
-            ],
-        },
-    )
+            f"{OWN}roof_type": next(iter(types), None),
+            f"{OWN}primitives": own,
+        }
+        shapes.append(PartShape(part.solid, figures, lod13, types, attributes))
+    return tuple(shapes)

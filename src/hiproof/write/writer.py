@@ -6,13 +6,13 @@ import os
 from abc import abstractmethod
 from collections.abc import Iterable
 from contextlib import AbstractContextManager, ExitStack
+from dataclasses import replace
 from typing import Any, BinaryIO, Self
 
 from ..model import Building
-from ..model.roof_figures import RoofFigures
-from .building_attributes import building_attributes, measure_figures
+from .building_attributes import measure_figures
 from .files import atomic_file
-from .fragments import Fragment, Sheet
+from .fragments import Fragment, Sheet, describe
 from .head import FileHead
 from .naming import UniqueNames, gml_name
 from .values import plain_text
@@ -21,48 +21,40 @@ from .values import plain_text
 class BuildingWriter(AbstractContextManager["BuildingWriter", bool | None]):
     """Base of the incremental writers.
 
-    Use it as `with Writer(path, ...) as writer: writer.add(building)`. The file appears when the
+    Use it as `with Writer(path, head) as writer: writer.add(sheet)`. The file appears when the
     block ends well; after an exception nothing is left and an older file stays. A format fills in
-    `begin`, `add`, `put` and `finish`.
+    `begin`, `fragment`, `put` and `finish`.
     """
 
     file: BinaryIO
 
     def __init__(self, path: str | os.PathLike[str], head: FileHead) -> None:
-        self.path, self.head, self.units = path, head, head.units.gml
+        self.path, self.head = path, head
         self.names, self.gml_names = UniqueNames(), UniqueNames()
 
     def add_all(self, buildings: Iterable[Building]) -> None:
         """Write the file with all these buildings."""
         with self:
             for building in buildings:
-                self.add(building)
+                self.add(describe(building, measure_figures(building), self.head))
 
     def begin(self, stack: ExitStack) -> None:
         """Write what precedes the first building; `stack` closes what is opened beside the file."""
 
-    def add(
-        self,
-        building: Building,
-        figures: RoofFigures | None = None,
-        attributes: dict[str, Any] | None = None,
-    ) -> None:
-        """Write one building, its solid's `figures` and its `attributes` if they are known."""
-        figures = figures or measure_figures(building)
-        if attributes is None:
-            osm = self.head.write.osm_tags
-            attributes = building_attributes(building, figures, self.head.prefix, self.units, osm)
-        name = self.names.take(plain_text(building.id))
-        in_gml = self.gml_names.take(gml_name(building.id))
-        self.add_sheet(Sheet(building, figures, attributes, name, in_gml, self.head))
+    def add(self, sheet: Sheet) -> None:
+        """Write one building, under a name that no earlier one has."""
+        id = sheet.building.id
+        name, in_gml = self.names.take(plain_text(id)), self.gml_names.take(gml_name(id))
+        self.put(self.fragment(replace(sheet, head=self.head, name=name, gml_name=in_gml)))
 
-    def add_sheet(self, sheet: Sheet) -> None:
-        """Write one building with all from which its text is made."""
-        raise NotImplementedError
+    @staticmethod
+    @abstractmethod
+    def fragment(sheet: Sheet) -> Fragment:
+        """Return a building's part of the file, made here or in another process."""
 
     @abstractmethod
     def put(self, fragment: Fragment) -> None:
-        """Write a building whose text `fragment` made, here or in another process."""
+        """Write a building's part."""
 
     def finish(self) -> None:
         """Write what comes after the last building."""

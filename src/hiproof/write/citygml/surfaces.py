@@ -87,7 +87,7 @@ def boundary_surfaces(
     figures: RoofFigures,
     polygon_ids: list[str],
     rings: list[str],
-    attributes: dict[int, dict[str, Any]] | None = None,
+    attributes: dict[int, dict[str, Any]],
 ) -> list[str]:
     """Return the RoofSurfaces, WallSurfaces and GroundSurfaces of a solid.
 
@@ -95,7 +95,7 @@ def boundary_surfaces(
     have their slope and azimuth in degrees; `attributes` has others by face.
     """
     numbers = number_surfaces(solid.faces, parts)
-    values = join_values(attributes or {}, numbers, figures)
+    values = join_values(attributes, numbers, figures)
     surfaces = []
     for number, faces in group_faces(numbers).items():
         tag, id = f"bldg:{solid.faces[number].kind}", polygon_ids[number]

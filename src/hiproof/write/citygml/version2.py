@@ -118,8 +118,19 @@ class CityGMLWriter(BuildingWriter):
         self.envelope_length = len(self.envelope(np.full(3, WIDEST), np.full(3, WIDEST)))
         self.file.write(b" " * self.envelope_length)
 
-    def add_sheet(self, sheet: Sheet) -> None:
-        self.put(fragment(sheet))
+    @staticmethod
+    def fragment(sheet: Sheet) -> Fragment:
+        """Return a cityObjectMember with ids that end in its name, namespaces as declared."""
+        text = f"<core:cityObjectMember>{building_element(sheet)}</core:cityObjectMember>".encode()
+        lines = terrain_lines(sheet)
+        if sheet.figures is not None:
+            solid, _ = choose_solid(sheet) or (sheet.building.solid, None)
+            lines += [in_file(sheet, solid) for solid in (solid, *sheet.boxes)]
+            lines += [undo_shift(sheet)] if sheet.shapes.outline is not None else []
+        if not lines:
+            return Fragment(text)
+        xyz = np.concatenate(lines)
+        return Fragment(text, (*xyz.min(axis=0).tolist(), *xyz.max(axis=0).tolist()))
 
     def put(self, fragment: Fragment) -> None:
         if fragment.extent is not None:
@@ -148,35 +159,16 @@ class CityGMLWriter(BuildingWriter):
 writer = CityGMLWriter
 
 
-def fragment(sheet: Sheet) -> Fragment:
-    """Return a cityObjectMember with ids that end in its name, namespaces as declared."""
-    text = f"<core:cityObjectMember>{building_element(sheet)}</core:cityObjectMember>".encode()
-    lines = terrain_lines(sheet)
-    if sheet.figures is not None:
-        own = choose_solid(sheet)
-        solids = [sheet.building.solid if own is None else own, *sheet.boxes]
-        lines = [*lines, *(in_file(sheet, solid) for solid in solids)]
-        lines += [undo_shift(sheet)] if sheet.shapes.outline is not None else []
-    if not lines:
-        return Fragment(text)
-    xyz = np.concatenate(lines)
-    return Fragment(text, (*xyz.min(axis=0).tolist(), *xyz.max(axis=0).tolist()))
-
-
 def building_element(sheet: Sheet) -> str:
     """Return one bldg:Building, its children in the schema's order, ids ending in its name."""
     building, figures, name, write = sheet.building, sheet.figures, sheet.gml_name, sheet.head.write
     text = [f'<bldg:Building gml:id="bldg-{name}"><gml:name>{xml_text(building.id)}</gml:name>']
-    change, created = sheet.building.change or {}, sheet.head.creation_date
-    begins = change.get("valid_from") if created is None else created.isoformat()
-    text += [
-        f"<core:{date}>{value}</core:{date}>"
-        for date, value in {
-            "creationDate": begins,
-            "terminationDate": change.get("valid_to"),
-        }.items()
-        if value
-    ]
+    change = building.change or {}
+    dates = {
+        "creationDate": sheet.head.creation_date or change.get("valid_from"),
+        "terminationDate": change.get("valid_to"),
+    }
+    text += [f"<core:{date}>{value}</core:{date}>" for date, value in dates.items() if value]
     text += [generic_attribute(key, value) for key, value in sheet.attributes.items()]
     if figures is not None:
         types = [
@@ -189,18 +181,14 @@ def building_element(sheet: Sheet) -> str:
         )
         text.append(level_surfaces(sheet))
         text.append(lod1_solid(sheet.shapes.lod13 or sheet.shapes.lod12, sheet.head.units.gml))
-    if figures is None or (solid := choose_solid(sheet)) is None:
-        text.append(with_terrain(sheet, "", []))
-        text += installation_elements(sheet)
-    else:
+    shell, rings, surfaces = "", [], []
+    if drawn := choose_solid(sheet):
+        solid, of_solid = drawn
         ids = surface_ids(solid.faces, name)
-        rings = list_face_rings(solid.faces, in_file(sheet, solid))
-        text.append(with_terrain(sheet, lod2_solid(ids, f"solid-{name}"), rings))
-        text += installation_elements(sheet)
-        if solid is building.solid:
-            text += boundary_surfaces(solid, building.parts, figures, ids, rings, sheet.surfaces)
-        else:
-            text += boundary_surfaces(solid, building.parts, sheet.finest[1], ids, rings)
+        shell, rings = lod2_solid(ids, f"solid-{name}"), list_rings(sheet, solid)
+        more = sheet.surfaces if solid is building.solid else {}
+        surfaces = boundary_surfaces(solid, building.parts, of_solid, ids, rings, more)
+    text += [with_terrain(sheet, shell, rings), *installation_elements(sheet), *surfaces]
     text += [part_element(sheet, number, part) for number, part in enumerate(sheet.shapes.parts, 1)]
     return "".join([*text, sheet.extension, "</bldg:Building>"])
 
@@ -209,7 +197,7 @@ def installation_elements(sheet: Sheet) -> list[str]:
     """Return the bldg:BuildingInstallation of every object on the roof."""
     elements = []
     for number, box in enumerate(sheet.boxes):
-        members = surface_members(list_face_rings(box.faces, in_file(sheet, box)))
+        members = surface_members(list_rings(sheet, box))
         code = FUNCTIONS[sheet.building.model.installations[number].type]
         elements.append(
             "<bldg:outerBuildingInstallation><bldg:BuildingInstallation "
@@ -238,9 +226,9 @@ def part_element(sheet: Sheet, number: int, part: PartShape) -> str:
     if "2.2" in sheet.head.write.lods:
         ids = surface_ids(part.solid.faces, sheet.gml_name, f"{number}.")
         text.append(lod2_solid(ids, f"shell-{name}"))
-        rings = list_face_rings(part.solid.faces, in_file(sheet, part.solid))
+        rings = list_rings(sheet, part.solid)
         text += [lod2_surfaces(rings)] if sheet.head.write.gml_surfaces else []
-        text += boundary_surfaces(part.solid, sheet.building.parts, part.figures, ids, rings)
+        text += boundary_surfaces(part.solid, sheet.building.parts, part.figures, ids, rings, {})
     return "".join([*text, "</bldg:BuildingPart></bldg:consistsOfBuildingPart>"])
 
 
@@ -248,12 +236,10 @@ def format_roof_and_height(
     types: Iterable[str], figures: RoofFigures, z_ground: float, write: WriteSettings
 ) -> str:
     """Return roofType, if any, and measuredHeight over the ground."""
-    code = roof_type_code(types, write.roof_codes) if types else None
-    roof = (
-        ""
-        if code is None
-        else f'<bldg:roofType codeSpace="{CODE_SPACES[write.roof_codes]}">{code}</bldg:roofType>'
-    )
+    roof = ""
+    if types:
+        code, space = roof_type_code(types, write.roof_codes), CODE_SPACES[write.roof_codes]
+        roof = f'<bldg:roofType codeSpace="{space}">{code}</bldg:roofType>'
     height = figures.h_max - min(z_ground, figures.h_base)
     return f'{roof}<bldg:measuredHeight uom="m">{height:.4f}</bldg:measuredHeight>'
 
@@ -265,9 +251,9 @@ def level_surfaces(sheet: Sheet) -> str:
         return ""
     solid = sheet.building.model.on_one_level
     upward = Face(tuple(ring[::-1] for ring in shapes.outline.rings), GROUND)
-    surface = multi_surface(list_face_rings((upward,), undo_shift(sheet)))
-    edge = multi_surface(
-        list_face_rings((upward,), sheet.head.units.gml.from_metres(shapes.edge_vertices(solid)))
+    edge_xyz = sheet.head.units.gml.from_metres(shapes.edge_vertices(solid))
+    surface, edge = (
+        multi_surface(list_face_rings((upward,), xyz)) for xyz in (undo_shift(sheet), edge_xyz)
     )
     return (
         f"<bldg:lod0FootPrint>{surface}</bldg:lod0FootPrint>"
@@ -314,11 +300,16 @@ def in_file(sheet: Sheet, solid: Solid) -> np.ndarray:
     return sheet.head.units.gml.from_metres(solid.vertices)
 
 
-def choose_solid(sheet: Sheet) -> Solid | None:
-    """Return the finest requested solid, None where none is or its parts have solids."""
+def list_rings(sheet: Sheet, solid: Solid) -> list[str]:
+    """Return the rings of each of a solid's faces."""
+    return list_face_rings(solid.faces, in_file(sheet, solid))
+
+
+def choose_solid(sheet: Sheet) -> tuple[Solid, RoofFigures] | None:
+    """Return the finest requested solid with its figures; None where its parts have solids."""
     lods = sheet.head.write.lods
     if sheet.figures is None or (sheet.shapes.parts and "2.2" in lods):
         return None
     if "2.3" in lods:
-        return sheet.finest[0]
-    return sheet.building.solid if "2.2" in lods else None
+        return sheet.finest
+    return (sheet.building.solid, sheet.figures) if "2.2" in lods else None

@@ -13,8 +13,7 @@ from importlib import resources
 from lxml import etree
 
 from ..fragments import Fragment, Sheet
-from . import version2
-from .version2 import CityGMLWriter
+from .version2 import NAMESPACES, CityGMLWriter
 
 NAMESPACES_3 = {
     "bldg": "http://www.opengis.net/citygml/building/3.0",
@@ -41,21 +40,18 @@ class CityGML3Writer(CityGMLWriter):
 
     namespaces, root_id = NAMESPACES_3, ' gml:id="city"'
 
-    def add_sheet(self, sheet: Sheet) -> None:
-        self.put(upgrade_member(version2.fragment(sheet)))
+    @staticmethod
+    def fragment(sheet: Sheet) -> Fragment:
+        """Return a building's part, without an extension of CityGML 2.0."""
+        return upgrade_member(CityGMLWriter.fragment(dataclasses.replace(sheet, extension="")))
 
 
 writer = CityGML3Writer
 
 
-def fragment(sheet: Sheet) -> Fragment:
-    """Return a building's part of a run's file, without an extension of CityGML 2.0."""
-    return upgrade_member(version2.fragment(dataclasses.replace(sheet, extension="")))
-
-
 def upgrade_member(member: Fragment) -> Fragment:
     """Translate a cityObjectMember of CityGML 2.0 to 3.0, namespaces as declared in both."""
-    declared = " ".join(f'xmlns:{prefix}="{uri}"' for prefix, uri in version2.NAMESPACES.items())
+    declared = " ".join(f'xmlns:{prefix}="{uri}"' for prefix, uri in NAMESPACES.items())
     old = etree.fromstring(f"<root {declared}>".encode() + member.text + b"</root>", HUGE)
     root = load_translation()(old).getroot()
     for owner in reversed(list(root.iter(*BUILDING_ELEMENTS))):  # parts before their building

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from ...frames import METRES, Units
 from ...model import GROUND, ROOF, Building, Face, Solid
 from ...model.roof_figures import RoofFigures
 from ..building_attributes import OWN
+from ..fragments import Sheet
 from ..shapes import PartShape, Shapes
 from ..surfaces import group_faces, join_values, measure_angles, number_surfaces
 from ..values import plain, round_value
@@ -44,23 +46,14 @@ class Vertices:
         return index
 
 
-def building_geometry(
-    building: Building,
-    figures: RoofFigures | None,
-    shapes: Shapes,
-    vertices: Vertices,
-    prefix: str,
-    lods: tuple[str, ...],
-    attributes: dict[int, dict[str, Any]] | None = None,
-    finest: tuple[Solid, RoofFigures] | None = None,
-) -> list[dict[str, Any]]:
-    """Return the geometry of the building itself, as far as `lods` ask.
+def building_geometry(sheet: Sheet, vertices: Vertices) -> list[dict[str, Any]]:
+    """Return the geometry of the building itself, as far as it is asked for.
 
     The footprint comes always, then roof edge, blocks, and solid. Vertices go to `vertices`. A
-    building in parts has no solid of its own. `attributes` has further ones of the solid's faces,
-    by face. `finest` is the solid of LoD2.3, None where it is not asked for.
+    building in parts has no solid of its own.
     """
-    if figures is None:
+    building, shapes, lods = sheet.building, sheet.shapes, sheet.head.write.lods
+    if sheet.figures is None:
         footprint = level_footprint(building)
         return (
             []
@@ -68,20 +61,12 @@ def building_geometry(
             else [multi_surface(outline_boundaries(footprint, building.z_ground, vertices))]
         )
     solids = []
-    if "2.2" in lods and not shapes.parts:
-        solid = building.solid
-        numbers = number_surfaces(solid.faces, building.parts)
-        surfaces = roof_surfaces(building, solid, numbers, figures, prefix)
-        for number, more in join_values(attributes or {}, numbers, figures).items():
-            kind = {"type": solid.faces[number].kind}
-            surfaces[number] = surfaces.get(number, kind) | more
-        solids = [solid_geometry(solid, vertices, LOD_SOLID, surfaces, numbers)]
+    if LOD_SOLID in lods and not shapes.parts:
+        whole = building.solid, sheet.figures, vertices, LOD_SOLID, sheet.surfaces
+        solids.append(described_solid(sheet, *whole))
+    if LOD_OVERHANGS in lods:
+        solids.append(described_solid(sheet, *sheet.finest, vertices, LOD_OVERHANGS, {}))
     blocks = [(shapes.lod12, "1.2"), (shapes.lod13, "1.3")]
-    if finest is not None:
-        solid, of_solid = finest
-        numbers = number_surfaces(solid.faces, building.parts)
-        surfaces = roof_surfaces(building, solid, numbers, of_solid, prefix)
-        solids.append(solid_geometry(solid, vertices, LOD_OVERHANGS, surfaces, numbers))
     return [
         *level_surfaces(building, shapes, vertices),
         *(solid_geometry(block, vertices, lod) for block, lod in blocks if block is not None),
@@ -89,16 +74,13 @@ def building_geometry(
     ]
 
 
-def part_geometry(
-    building: Building, part: PartShape, vertices: Vertices, prefix: str, lods: tuple[str, ...]
-) -> list[dict[str, Any]]:
-    """Return block and solid of a building part, as far as `lods` ask."""
-    block = [] if part.block is None else [solid_geometry(part.block, vertices, "1.3")]
-    if "2.2" not in lods:
-        return block
-    numbers = number_surfaces(part.solid.faces, building.parts)
-    surfaces = roof_surfaces(building, part.solid, numbers, part.figures, prefix)
-    return [*block, solid_geometry(part.solid, vertices, LOD_SOLID, surfaces, numbers)]
+def part_geometry(sheet: Sheet, part: PartShape, vertices: Vertices) -> list[dict[str, Any]]:
+    """Return block and solid of a building part, as far as they are asked for."""
+    geometry = [] if part.block is None else [solid_geometry(part.block, vertices, "1.3")]
+    if LOD_SOLID in sheet.head.write.lods:
+        whole = part.solid, part.figures, vertices, LOD_SOLID
+        geometry.append(described_solid(sheet, *whole, {}))
+    return geometry
 
 
 def level_surfaces(building: Building, shapes: Shapes, vertices: Vertices) -> list[dict[str, Any]]:
@@ -137,7 +119,7 @@ def solid_geometry(
     solid: Solid,
     vertices: Vertices,
     lod: str,
-    described: dict[int, dict[str, Any]] | None = None,
+    described: Mapping[int, dict[str, Any]] = MappingProxyType({}),
     numbers: Sequence[int] | None = None,
 ) -> dict[str, Any]:
     """Return the Solid with its semantics.
@@ -145,51 +127,53 @@ def solid_geometry(
     A surface in `described` is a semantic surface of its own; all other faces of a kind share one.
     `numbers` are those of the faces' surfaces.
     """
-    described = described or {}
     vertex_numbers = vertices.add(solid.vertices)
-    surfaces: list[dict[str, Any]] = []
-    places: dict[int | str, int] = {}
-    values = []
-    for index, face in enumerate(solid.faces):
-        number = numbers[index] if numbers else index
-        is_described = number in described
-        key = number if is_described else face.kind
-        if key not in places:
-            places[key] = len(surfaces)
-            surfaces.append(described[number] if is_described else {"type": face.kind})
-        values.append(places[key])
+    surfaces: dict[int | str, dict[str, Any]] = {}
+    keys = []
+    for number, face in zip(numbers or range(len(solid.faces)), solid.faces, strict=True):
+        keys.append(number if number in described else face.kind)
+        surfaces.setdefault(keys[-1], described.get(number, {"type": face.kind}))
+    places = {key: place for place, key in enumerate(surfaces)}
     boundaries = [
         [[vertex_numbers[vertex] for vertex in ring] for ring in face.rings] for face in solid.faces
     ]
-    semantics = {"surfaces": surfaces, "values": [values]}
+    semantics = {"surfaces": [*surfaces.values()], "values": [[places[key] for key in keys]]}
     return {"type": "Solid", "lod": lod, "boundaries": [boundaries], "semantics": semantics}
 
 
-def roof_surfaces(
-    building: Building, solid: Solid, numbers: Sequence[int], figures: RoofFigures, prefix: str
-) -> dict[int, dict[str, Any]]:
-    """Return the semantics of a solid's roof surfaces by number.
+def described_solid(
+    sheet: Sheet,
+    solid: Solid,
+    figures: RoofFigures,
+    vertices: Vertices,
+    lod: str,
+    attributes: Mapping[int, dict[str, Any]],
+) -> dict[str, Any]:
+    """Return a solid, the building's or a part's, whose roof surfaces have semantics of their own.
 
-    `solid` is the building's or a part's, and `numbers` are those of its faces' surfaces. They are
-    slope, azimuth (degrees), and the roof part to which a surface belongs.
+    They are slope, azimuth (degrees), and the roof part to which a surface belongs. `attributes`
+    has further ones of faces.
     """
-    result = {}
+    parts, prefix = sheet.building.parts, sheet.head.prefix
+    numbers = number_surfaces(solid.faces, parts)
+    described: dict[int, dict[str, Any]] = {}
     for number, faces in group_faces(numbers).items():
         face = solid.faces[number]
         if face.kind != ROOF:
             continue
         slope, azimuth = measure_angles(figures, faces)
-        result[number] = {
+        described[number] = {
             "type": ROOF,
             f"{prefix}slope": plain(round_value(slope, 3)),
             f"{prefix}azimuth": plain(round_value(azimuth, 3)),
         }
-        if 0 <= face.part < len(building.parts):
-            result[number] |= {
-                f"{OWN}part": int(face.part),
-                f"{OWN}part_type": building.parts[face.part].type,
-            }
-    return result
+        if 0 <= face.part < len(parts):
+            own = {f"{OWN}part": int(face.part), f"{OWN}part_type": parts[face.part].type}
+            described[number] |= own
+    for number, more in join_values(attributes, numbers, figures).items():
+        kind = {"type": solid.faces[number].kind}
+        described[number] = described.get(number, kind) | more
+    return solid_geometry(solid, vertices, lod, described, numbers)
 
 
 def level_footprint(building: Building) -> shapely.Polygon | None:

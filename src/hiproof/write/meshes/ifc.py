@@ -116,7 +116,7 @@ class IfcModel:
     def add(self, model: ViewedModel) -> None:
         """Add a building with its body and its properties."""
         if self.origin is None:
-            self.origin = np.floor(model.solid.vertices.min(axis=0))
+            self.origin = model.corner
         middle = (model.solid.vertices.min(axis=0) + model.solid.vertices.max(axis=0)) / 2
         key = self.keys.take(f"{model.id} {self.name_square(middle)}")
         building = self.make_rooted(

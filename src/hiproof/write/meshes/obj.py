@@ -36,7 +36,7 @@ def write_models(path: Path, buildings: Iterable[ViewedModel], crs: str | None =
     with atomic_file(path) as file:
         for model in buildings:
             if origin is None:
-                origin = np.floor(model.solid.vertices.min(axis=0))
+                origin = model.corner
                 file.write(header(library.name, origin, crs).encode())
             file.write(building_text(model, origin, first).encode())
             first += len(model.solid.vertices)

@@ -39,7 +39,7 @@ def write_models(path: Path, buildings: Iterable[ViewedModel], crs: str | None =
     layers = {kind: add_layer(rhino, document, kind) for kind in (ROOF, WALL, GROUND, CEILING)}
     for model in buildings:
         if not count:
-            origin = np.floor(model.solid.vertices.min(axis=0))
+            origin = model.corner
         add_building(rhino, document, layers, model, origin)
         count += 1
     document.Strings["origin"] = " ".join(f"{value:.0f}" for value in origin)

@@ -31,7 +31,7 @@ def write_models(path: Path, buildings: Iterable[ViewedModel], crs: str | None =
         file.write(bytes(STL_HEADER_BYTES + 4))
         for model in buildings:
             if not count:
-                origin = np.floor(model.solid.vertices.min(axis=0))
+                origin = model.corner
             rows = solid_triangles(model, origin)
             file.write(rows.tobytes())
             triangles, count = triangles + len(rows), count + 1

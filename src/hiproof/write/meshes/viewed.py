@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from ...frames import Units
 from ...model import CEILING, GROUND, ROOF, WALL, Building, Face, Solid
 from ..colours import GROUND_COLOUR, WALL_COLOUR, type_colour, type_colours
+from ..fragments import Sheet
 from ..parameters import numbers, part_record
 
 SHOWN_PART_KEYS = ("type", "parameters", "position", "rotation")
@@ -30,6 +33,11 @@ class ViewedModel(NamedTuple):
     attributes: dict[str, Any]
     part_types: Mapping[int, str]
 
+    @property
+    def corner(self) -> np.ndarray:
+        """The solid's lowest coordinates (3,) in whole metres, an origin of files."""
+        return np.floor(self.solid.vertices.min(axis=0))
+
     def faces_by_look(self) -> dict[Look, list[Face]]:
         """Group roofs, walls, grounds and ceilings by their look."""
         result: dict[Look, list[Face]] = {}
@@ -47,22 +55,21 @@ class ViewedModel(NamedTuple):
         return result
 
 
-def view_building(
-    building: Building, attributes: dict[str, Any], units: Units, lods: Sequence[str] = ()
-) -> ViewedModel:
-    """Return the model of a building with its `attributes`.
+def view_building(sheet: Sheet) -> ViewedModel:
+    """Return the model of a building with its attributes.
 
     Its parameters are among them as JSON where its parts have any. The solid is in metres of the
-    CRS of files, which are in `units`. It has overhangs where `lods` name LoD2.3.
+    CRS of files. It has overhangs where LoD2.3 is asked for.
     """
-    solid = building.model.finest_solid if "2.3" in lods else building.solid
+    building, units = sheet.building, sheet.head.units.gml
+    solid = building.model.finest_solid if "2.3" in sheet.head.write.lods else building.solid
     text = parameters_text(building)
     there = Units(units.plan, units.height).to_metres(units.from_metres(solid.vertices))
     return ViewedModel(
         building.id,
         building.type or "unknown",
         Solid(there, solid.faces),
-        merge_values({"parameters": text}, attributes) if text else attributes,
+        merge_values({"parameters": text}, sheet.attributes) if text else sheet.attributes,
         {number: part.type for number, part in enumerate(building.parts)},
     )
 

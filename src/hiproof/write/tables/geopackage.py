@@ -86,8 +86,10 @@ class AttributesWriter(BuildingWriter):
             for layer in self.layers
         }
 
-    def add_sheet(self, sheet: Sheet) -> None:
-        self.put(fragment(sheet))
+    @staticmethod
+    def fragment(sheet: Sheet) -> Fragment:
+        """Return a building's rows as text."""
+        return Fragment(table_rows(sheet).to_text())
 
     def put(self, fragment: Fragment) -> None:
         lines = split_lines(fragment.text)
@@ -126,12 +128,3 @@ def write_styles(path: str | os.PathLike[str], styles: Sequence[Style]) -> None:
 
 
 writer = AttributesWriter
-
-
-def fragment(sheet: Sheet) -> Fragment:
-    """Return a building's rows in the tables of a run, as text."""
-    return Fragment(
-        table_rows(
-            sheet.building, sheet.figures, sheet.attributes, sheet.head.units.table, sheet.surfaces
-        ).to_text()
-    )

@@ -28,9 +28,8 @@ from ...read.models.damage import Damaged, refuse
 from ...read.outlines.attribute_columns import quote
 from ...read.outlines.database import TIMEOUT_S, import_psycopg, refuse_half_a_password
 from ..attribute_list import PREFIX
-from ..described import Described
+from ..fragments import Sheet
 from ..meshes.triangles import faces_triangles
-from ..naming import FileUnits
 from ..values import plain_text
 from .rows import Rows, split_lines, table_rows
 from .vector_layer import HISTORY, WaitingRows, column_kind, column_names
@@ -96,15 +95,13 @@ class Load:
     append: bool = False
 
 
-def load_tables(
-    dsn: str, buildings: Iterable[Described], units: FileUnits, run: Load, damaged: Damaged = refuse
-) -> int:
+def load_tables(dsn: str, buildings: Iterable[Sheet], run: Load, damaged: Damaged = refuse) -> int:
     """Load `buildings` of a `run` into its tables, and return how many.
 
-    They are PREFIX_buildings, PREFIX_parts and PREFIX_roofs of the database at `dsn`, coordinates
-    in `units`. A building whose id comes again is told to `damaged` and left out. Raises InputError
-    for a prefix that makes no names of tables, OutputError for a database that cannot be written or
-    holds another run.
+    They are PREFIX_buildings, PREFIX_parts and PREFIX_roofs of the database at `dsn`. A building
+    whose id comes again is told to `damaged` and left out. Raises InputError for a prefix that
+    makes no names of tables, OutputError for a database that cannot be written or holds another
+    run.
     """
     if not TABLE_PREFIX.fullmatch(run.prefix):
         raise InputError(
@@ -122,7 +119,7 @@ def load_tables(
             cursor.execute("select pg_advisory_xact_lock(%s, 0)", (LOCKS,))
             cursor.execute("create extension if not exists postgis")
             connection.commit()
-            return Loading(cursor, run).load(stack, buildings, units, damaged)
+            return Loading(cursor, run).load(stack, buildings, damaged)
         except (psycopg.Error, UnicodeError) as error:
             raise explain_not_written(error) from error
 
@@ -145,9 +142,7 @@ class Loading:
     def name(self, ending: str) -> str:
         return f"{self.prefix}_{ending}"
 
-    def load(
-        self, stack: ExitStack, buildings: Iterable[Described], units: FileUnits, damaged: Damaged
-    ) -> int:
+    def load(self, stack: ExitStack, buildings: Iterable[Sheet], damaged: Damaged) -> int:
         """Load the run; returns its number of buildings."""
         self.cursor.execute("select pg_advisory_xact_lock(%s, hashtext(%s))", (LOCKS, self.prefix))
         self.refuse_other_runs()
@@ -155,7 +150,7 @@ class Loading:
             WaitingRows(table.layer, stack.enter_context(tempfile.TemporaryFile()))  # noqa: SIM115
             for table in POSTGIS_TABLES
         ]
-        count = collect_rows(waiting, buildings, units, damaged)
+        count = collect_rows(waiting, buildings, damaged)
         if self.run.replace:
             names = ", ".join(self.name(t.ending) for t in reversed(POSTGIS_TABLES))
             self.cursor.execute(f"drop table if exists {names}, {self.name('runs')}")
@@ -300,28 +295,26 @@ class Loading:
         self.cursor.execute(f"insert into {name} values (%s, %s)", (self.run.name, self.run.folder))
 
 
-def collect_rows(
-    waiting: list[WaitingRows], buildings: Iterable[Described], units: FileUnits, damaged: Damaged
-) -> int:
+def collect_rows(waiting: list[WaitingRows], buildings: Iterable[Sheet], damaged: Damaged) -> int:
     """Put the rows of all buildings where they wait; returns how many buildings."""
     visited: set[str] = set()
-    for described in buildings:
-        id = plain_text(described.building.id)
+    for sheet in buildings:
+        id = plain_text(sheet.building.id)
         if id in visited:
             damaged(InputError(f"expected buildings of different ids, got {id!r:.80} again"))
             continue
         visited.add(id)
-        lines = split_lines(database_rows(described, units).to_text())
+        lines = split_lines(database_rows(sheet).to_text())
         for rows in waiting:
             rows.put(lines[rows.layer])
     return len(visited)
 
 
-def database_rows(described: Described, units: FileUnits) -> Rows:
+def database_rows(sheet: Sheet) -> Rows:
     """Return a building's rows as in the GeoPackage, its solid in place of the outline."""
-    building, figures, attributes = described
-    rows = table_rows(building, figures, attributes, units.table)
-    solid = None if building.built is None else polyhedral_wkb(building.solid, units.table)
+    building, rows = sheet.building, table_rows(sheet)
+    units = sheet.head.units.table
+    solid = None if building.built is None else polyhedral_wkb(building.solid, units)
     return rows._replace(buildings=tuple((solid, values) for _, values in rows.buildings))
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -14,12 +13,12 @@ from ...errors import OutputError
 from ...frames import METRES, Units
 from ...model import ROOF, Building, Face
 from ...model.roof_figures import RoofFigures
-from ...primitives.cants import CANTED, MEASURES, list_cants
-from ..attribute_list import SHAPE, TABLES
+from ..attribute_list import TABLES
+from ..building_attributes import ROW_ENCODER, part_values
+from ..fragments import Sheet
 from ..surfaces import number_surfaces
 from ..values import metres, plain_text, round_value
 
-ENCODER = json.JSONEncoder(check_circular=False)  # a row cannot hold itself
 Row = tuple[bytes | None, dict[str, Any]]  # the geometry as WKB, the values by column
 
 
@@ -34,7 +33,7 @@ class Rows(NamedTuple):
     def to_text(self) -> bytes:
         """Return the rows as JSON, a line a table, geometries in hexadecimal digits."""
         tables = ([[wkb and wkb.hex(), values] for wkb, values in table] for table in self)
-        return b"\n".join(ENCODER.encode(table).encode() for table in tables)
+        return b"\n".join(ROW_ENCODER.encode(table).encode() for table in tables)
 
 
 def split_lines(text: bytes) -> dict[str, bytes]:
@@ -54,19 +53,9 @@ def split_lines(text: bytes) -> dict[str, bytes]:
     return dict(zip(Rows._fields, lines, strict=True))
 
 
-def table_rows(
-    building: Building,
-    figures: RoofFigures | None,
-    attributes: dict[str, Any],
-    units: Units = METRES,
-    surfaces: dict[int, dict[str, Any]] | None = None,
-) -> Rows:
-    """Return the rows of `building`, their geometry in `units`.
-
-    `attributes` are its own and `figures` those of its solid; `surfaces` has further attributes of
-    its roof faces, by face.
-    """
-    parts = part_rows(building, units)
+def table_rows(sheet: Sheet) -> Rows:
+    """Return the rows of a building, their geometry in the unit of tables."""
+    building, units = sheet.building, sheet.head.units.table
     rows = []
     for model in (building.change or {}).get("history", ()):
         shell, *holes = model["outline"]
@@ -74,25 +63,21 @@ def table_rows(
         values |= {"successor": plain_text(building.id), "parts": len(model["parts"])}
         rows.append((encode_geometry(shapely.Polygon(shell, holes), units), values))
     return Rows(
-        (building_row(building, attributes, units),),
-        parts,
-        surface_rows(building, figures, units, surfaces),
+        (building_row(building, sheet.attributes, units),),
+        part_rows(building, units),
+        surface_rows(building, sheet.figures, units, sheet.surfaces),
         tuple(rows),
     )
 
 
-def building_row(building: Building, attributes: dict[str, Any], units: Units = METRES) -> Row:
+def building_row(building: Building, attributes: dict[str, Any], units: Units) -> Row:
     """Return the outline in `units`, None if unknown, and attributes by column."""
+    outline = building.footprint if building.built is None else building.roof.world_outline
     names = {
         f"{name}_input" if name.lower() == "id" else name: value
         for name, value in attributes.items()
     }
-    return encode_geometry(find_outline(building), units), {"id": plain_text(building.id), **names}
-
-
-def find_outline(building: Building) -> shapely.Geometry | None:
-    """Return the world outline: the modelled one, else the requested, else None."""
-    return building.footprint if building.built is None else building.roof.world_outline
+    return encode_geometry(outline, units), {"id": plain_text(building.id), **names}
 
 
 def part_rows(building: Building, units: Units = METRES) -> tuple[Row, ...]:
@@ -106,48 +91,11 @@ def part_rows(building: Building, units: Units = METRES) -> tuple[Row, ...]:
     return tuple(rows)
 
 
-def part_values(building: Building, number: int, visible: shapely.Geometry) -> dict[str, Any]:
-    """Return a part's values: type, `visible` area, place, parameters, deviations."""
-    part, (x, y, z) = (
-        building.parts[number],
-        building.roof.frame.to_world(building.parts[number].translation),
-    )
-    # Cants share a column: thirty columns that hardly a part fills would hide the others.
-    cants = list_cants(part.parameters)
-    rows = [
-        [round_value(part.parameters[f"{measure}_{cant}"]) for measure in MEASURES]
-        for cant in cants
-    ]
-    columns = {"t_z": "z_eave_sigma", "kappa": "rotation_sigma"} | {
-        name: f"{name}_sigma" for name in SHAPE
-    }
-    return {
-        "part": number,
-        "type": part.type,
-        "area_m2": metres(visible.area),
-        "x": metres(x),
-        "y": metres(y),
-        "z_eave": metres(z),
-        "rotation": round_value(math.degrees(part.kappa)),
-        **{
-            name: round_value(value)
-            for name, value in part.parameters.items()
-            if name not in CANTED
-        },
-        **({"cants": ENCODER.encode(rows)} if cants else {}),
-        **{
-            columns[name]: round_value(math.degrees(value) if name == "kappa" else value)
-            for name, value in part.sigma.items()
-            if name in columns
-        },
-    }
-
-
 def surface_rows(
     building: Building,
     figures: RoofFigures | None,
-    units: Units = METRES,
-    attributes: dict[int, dict[str, Any]] | None = None,
+    units: Units,
+    attributes: dict[int, dict[str, Any]],
 ) -> tuple[Row, ...]:
     """Return a row a roof face of the solid.
 
@@ -173,7 +121,7 @@ def surface_rows(
             "slope_deg": round_value(figures.face_slope_deg[index], 3),
             "azimuth_deg": round_value(azimuth, 3) if math.isfinite(azimuth) else None,
             "area_m2": metres(figures.face_area_m2[index]),
-            **(attributes or {}).get(index, {}),
+            **attributes.get(index, {}),
         }
         rows.append((polygon, values))
     return tuple(rows)
