@@ -20,7 +20,8 @@ from ..errors import InputError
 from ..geometry.rings import intersect, join, repair_polygons, subtract, unite
 from ..model import Roof
 from ..primitives.cants import keep_cants_in_place
-from .change import make_polygon, with_sizes
+from ..write.parameters import outline_record
+from .change import leave_out, make_polygon, with_sizes
 from .record import list_at, number, numbers_by_name, place, polygon
 
 # Parameters that grow with a side of the rectangle.
@@ -60,7 +61,7 @@ def split_part(
             f"expected a cut across length or width at a share of it between 0 and 1, got {side}, "
             f"{share}"
         )
-    part = {key: value for key, value in with_sizes(part).items() if key != "sigma"}
+    part = leave_out(with_sizes(part), "sigma")
     whole, axis = part["parameters"][side], find_axis(part, side)
     cut = np.array(part["position"][:2]) + (share - 0.5) * whole * axis
     halves = []
@@ -96,10 +97,9 @@ def merged_parts(item: dict[str, Any], other: dict[str, Any]) -> dict[str, Any]:
     moved = np.array([x, y]) - main["position"][:2]
     parameters = keep_cants_in_place(parameters, float(moved @ along), float(moved @ across))
     together = unite([make_polygon(o) for part in (main, side) for o in part["outlines"]], GRID_M)
-    merged = {key: value for key, value in main.items() if key != "sigma"}
     position = [float(x), float(y), main["position"][2]]
     return {
-        **merged,
+        **leave_out(main, "sigma"),
         "parameters": parameters,
         "position": position,
         "outlines": list_rings(together),
@@ -187,7 +187,7 @@ def cut_outlines(outlines: list[Any], place: np.ndarray, direction: np.ndarray) 
 def list_rings(geometry: shapely.Geometry) -> list[Any]:
     """Return the polygons of a geometry as rings, the outer first."""
     return [
-        [shapely.get_coordinates(ring).tolist() for ring in (polygon.exterior, *polygon.interiors)]
+        outline_record(polygon)
         for polygon in shapely.get_parts(geometry)
         if polygon.geom_type == "Polygon" and not polygon.is_empty
     ]

@@ -36,7 +36,7 @@ def changed_part(part: dict[str, Any], change: dict[str, Any], z_origin: float) 
     Raises InputError for what contradicts itself.
     """
     change = {name: value for name, value in change.items() if value is not None}
-    part = {key: value for key, value in part.items() if key != "sigma"}
+    part = leave_out(part, "sigma")
     kind = change.pop("type", part["type"])
     if kind != part["type"]:
         sizes = {name: measure(change[name], name) for name in PLAN_SIZES if name in change}
@@ -54,11 +54,15 @@ def changed_part(part: dict[str, Any], change: dict[str, Any], z_origin: float) 
         part = side_by_side(part)
     moves = placed.keys() & {"position", "rotation"} or change.keys() & set(PLAN_SIZES)
     if moves and "outlines" not in placed:
-        part = {key: value for key, value in with_sizes(part).items() if key != "outlines"}
+        part = leave_out(with_sizes(part), "outlines")
     part = from_lowest_eave({**part, **placed, "parameters": {**part["parameters"], **change}})
     if eave is not None:
         part["position"] = [*part["position"][:2], eave - z_origin]
     return part if ridge is None else with_ridge(part, ridge - z_origin)
+
+
+def leave_out(part: dict[str, Any], name: str) -> dict[str, Any]:
+    return {key: value for key, value in part.items() if key != name}
 
 
 def from_lowest_eave(part: dict[str, Any]) -> dict[str, Any]:

@@ -49,7 +49,7 @@ def opened_parameters(
         # Editors may begin it with a mark of the encoding.
         with Path(path).open(encoding="utf-8-sig") as file:
             lines = objects(file, path, damaged)
-            yield read_head(next(lines, None), path), records(lines, path, damaged)
+            yield read_head(next(lines, (1, None))[1], path), records(lines, path, damaged)
     except (OSError, UnicodeDecodeError) as error:
         expected = "a parameters.jsonl that hiproof wrote"
         raise explain_unreadable(os.fspath(path), expected, error) from error
@@ -75,9 +75,10 @@ def parse_object(line: str, place: str) -> Any:
         value = json.loads(line)
     except json.JSONDecodeError as error:
         is_cut = error.pos >= len(line)
+        beside = line[max(error.pos - 12, 0) : error.pos + 12].strip()
         raise InputError(
             f"expected a JSON object in {place}, got a syntax error at column "
-            f"{error.colno} ({error.msg}), beside {quote_line(line, error.pos)!r}; "
+            f"{error.colno} ({error.msg}), beside {beside!r}; "
             + ("an object stands on one line" if is_cut else "mend it there")
         ) from error
     except (ValueError, RecursionError) as error:  # a number of 5,000 digits, nested without end
@@ -87,14 +88,9 @@ def parse_object(line: str, place: str) -> Any:
     return readable(value) if ESCAPED.search(line) else value
 
 
-def quote_line(line: str, place: int) -> str:
-    return line[max(place - 12, 0) : place + 12].strip()
-
-
-def read_head(first: tuple[int, Any] | None, path: str | os.PathLike[str]) -> FileHead:
-    """Read the head from the first line."""
+def read_head(record: Any, path: str | os.PathLike[str]) -> FileHead:
+    """Read the head, the object on the first line."""
     where = os.fspath(path)
-    record = first[1] if first else None
     if not isinstance(record, dict) or HEAD_KEY not in record:
         raise InputError(
             f'expected {{"{HEAD_KEY}": {VERSION}, ...}} in the first line of {where}, got '

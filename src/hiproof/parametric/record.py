@@ -171,27 +171,15 @@ def read_part_outlines(
     outline: shapely.Polygon,
     label: str,
 ) -> list[shapely.Polygon]:
-    """Return the outlines given of a part, else its plan's share of the building's outline."""
-    if record.get("outlines") is None:
-        return clip_plan(text_at(record, "type"), parameters, position, kappa, outline, label)
-    return [polygon(rings, f"an outline of {label}") for rings in list_at(record, "outlines")]
-
-
-def clip_plan(
-    kind: str,
-    parameters: Mapping[str, float],
-    position: np.ndarray,
-    kappa: float,
-    outline: shapely.Polygon,
-    label: str,
-) -> list[shapely.Polygon]:
-    """Return the polygons that a part's plan, a rectangle or round, covers of the outline."""
+    """Return the outlines given of a part, else what its plan covers of the building's outline."""
+    if record.get("outlines") is not None:
+        return [polygon(rings, f"an outline of {label}") for rings in list_at(record, "outlines")]
     if "width" not in parameters or "length" not in parameters:
         raise InputError(
             f"expected width and length, or outlines, of {label}, got neither; give the rectangle"
         )
     half = 0.5 * np.array([parameters["length"], parameters["width"]])
-    rim = np.array(CATALOGUE[kind].variant(parameters).rim) * half
+    rim = np.array(CATALOGUE[record["type"]].variant(parameters).rim) * half
     return clip(place_plan(rim, position, kappa), outline)
 
 
@@ -264,55 +252,33 @@ def read_change(record: Mapping[str, Any]) -> dict[str, Any] | None:
             f"expected a class of change ({', '.join(codes)}), got {excerpt(code)}; leave it as "
             "the update wrote it"
         )
-    change = read_values(record["change"], "change", "the change")
-    places = [
-        read_change_place(place, f"place {k} of the change")
-        for k, place in enumerate(list_at(change, "places"))
-    ]
-    history = [
-        read_values(model, "ended_model", f"model {k} of the history")
-        for k, model in enumerate(list_at(change, "history"))
-    ]
-    lists = {name: list_at(change, name) for name in ("lineage", "predecessors")}
-    values = {**change, "places": places, **lists, "history": history}
-    return {
-        name: values.get(name) for name in TABLES["change"].names if name != "history" or history
-    }
-
-
-def read_change_place(record: Any, label: str) -> dict[str, Any]:
-    """Read a place that changed."""
-    place = read_values(record, "change_place", label)
-    if len(list_at(place, "parts")) not in (0, 2):
-        raise InputError(
-            f"expected the earlier and the new part of {label}, got {excerpt(place['parts'])}; "
-            "write null for none"
-        )
-    return place
+    change = require_values(record["change"], "change", "the change")
+    lists = ("places", "lineage", "predecessors", "history")
+    values = {**change, **{name: list_at(change, name) for name in lists}}
+    names = TABLES["change"].names
+    return {name: values.get(name) for name in names if name != "history" or values[name]}
 
 
 def read_update(record: Any) -> UpdateHead:
     """Read what an update found beside its buildings."""
-    update = read_values(record, "update", "update")
-    roofs = [
-        read_roof_outside(roof, f"roof {k} of roofs_outside")
-        for k, roof in enumerate(list_at(update, "roofs_outside"))
-    ]
+    update, names = require_values(record, "update", "update"), TABLES["roof_outside"].names
+    roofs = [{name: roof.get(name) for name in names} for roof in list_at(update, "roofs_outside")]
     return UpdateHead(text_at(update, "survey"), tuple(roofs))
 
 
-def read_roof_outside(record: Any, label: str) -> dict[str, Any]:
-    """Read a roof outside all outlines."""
-    number(require_mapping(record, label).get("area"), f"area of {label}")
-    roof = read_values(record, "roof_outside", label)
-    return {name: roof.get(name) for name in TABLES["roof_outside"].names}
+# What a sentence calls one of the objects of a list.
+LISTED = {
+    "change_place": "place {} of the change",
+    "ended_model": "model {} of the history",
+    "roof_outside": "roof {} of roofs_outside",
+}
 
 
-def read_values(record: Any, table: str, label: str) -> dict[str, Any]:
-    """Read an object that is kept as it is, with the keys and types of a table."""
+def require_values(record: Any, table: str, label: str) -> Mapping[str, Any]:
+    """Check an object that is kept as it is, with the keys and types of a table."""
     refuse_other_keys(record, table, label)
     refuse_other_types(record, table, label)
-    return dict(record)
+    return record
 
 
 def refuse_other_types(record: Mapping[str, Any], table: str, label: str = "") -> None:
@@ -322,9 +288,11 @@ def refuse_other_types(record: Mapping[str, Any], table: str, label: str = "") -
         if attribute.kind == "text":
             text_at(record, name)
         elif type.endswith("[]"):
-            for item in list_at(record, name):
+            for k, item in enumerate(list_at(record, name)):
                 if type == "polygon[]":
                     polygon(item, f"an outline of {label}")
+                elif type[:-2] in LISTED:
+                    require_values(item, type[:-2], LISTED[type[:-2]].format(k))
         elif type == "shares":
             numbers_by_name(value or {}, name)
         elif type == "number":
@@ -338,6 +306,11 @@ def refuse_other_types(record: Mapping[str, Any], table: str, label: str = "") -
                 place(value, name, coordinate)
             elif type == "polygon?":
                 polygon(value, name)
+    if table == "change_place" and len(list_at(record, "parts")) not in (0, 2):
+        raise InputError(
+            f"expected the earlier and the new part of {label}, got {excerpt(record['parts'])}; "
+            "write null for none"
+        )
 
 
 def read_quality(record: Mapping[str, Any]) -> Quality:

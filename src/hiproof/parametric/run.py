@@ -103,56 +103,53 @@ def build_file(
         refuse_overwriting(outputs, [path, *list_run_inputs(path)])
         offset = head.offset if settings.write.out_crs == head.write.out_crs else None
         built.models = list_model_paths(settings, out)
-        maker = Maker(dataclasses.replace(head, write=settings.write, offset=offset))
+        head = dataclasses.replace(head, write=settings.write, offset=offset)
         first = next(records, None)
-        records = iter(()) if first is None else chain([first], records)
-        if maker.head.offset is None:
-            maker.head = dataclasses.replace(maker.head, offset=offset_by(first, maker.head.units))
-        join_fragments(
-            list_requested_files(settings, out),
-            make_fragments(maker, records, built, progress),
-            maker.head,
-        )
-    write_record(path, out, maker.head, built)
+        if first is not None:
+            records = chain([first], records)
+        if offset is None:
+            head = dataclasses.replace(head, offset=offset_by(first, head.units))
+        files = list_requested_files(settings, out)
+        join_fragments(files, make_fragments(records, head, built, progress), head)
+    write_record(path, out, head, built)
     return built
 
 
 def make_fragments(
-    maker: Maker, records: Iterator[dict[str, Any]], built: Built, progress: Callable[[int], None]
+    records: Iterator[dict[str, Any]],
+    head: FileHead,
+    built: Built,
+    progress: Callable[[int], None],
 ) -> Iterator[Fragments]:
     """Yield the texts of every building, and count them."""
+    taken = UniqueNames(), UniqueNames()
     for number, record in enumerate(records, 1):
-        building, texts = maker.make(record)
+        id = record["id"]
+        names = taken[0].take(plain_text(id)), taken[1].take(gml_name(id))
+        building, texts = make_texts(record, names, head)
         built.count(building)
         progress(number)
         yield texts
 
 
-class Maker:
-    """Makes the texts of building after building, as the files of one run hold them."""
-
-    def __init__(self, head: FileHead) -> None:
-        self.head = head
-        self.names = UniqueNames(), UniqueNames()
-
-    def make(self, record: dict[str, Any]) -> tuple[Building, Fragments]:
-        """Return an object's building and texts; without a model it keeps its parameters."""
-        id = record["id"]
-        names = self.names[0].take(plain_text(id)), self.names[1].take(gml_name(id))
-        try:
-            if names[0] != plain_text(id):
-                raise InputError(
-                    f"expected buildings of different ids, got {id!r} again; give this one another"
-                )
-            return fragments(build(record, self.head.compose), names, self.head)
-        except HiproofError as error:
-            reason, status = str(error), Status.NOT_BUILT
-        except Exception as error:
-            reason, status = report_error(error).detail, Status.INTERNAL_ERROR
-        building = Building(id, status, mask(reason))
-        building, texts = fragments(building, names, self.head)
-        selection = finite({**record, "status": status.code, "detail": building.detail})
-        return building, texts | {"parameters": Fragment(dump(selection) + b"\n")}
+def make_texts(
+    record: dict[str, Any], names: tuple[str, str], head: FileHead
+) -> tuple[Building, Fragments]:
+    """Return an object's building and texts; without a model it keeps its parameters."""
+    id = record["id"]
+    try:
+        if names[0] != plain_text(id):
+            raise InputError(
+                f"expected buildings of different ids, got {id!r} again; give this one another"
+            )
+        return fragments(build(record, head.compose), names, head)
+    except HiproofError as error:
+        reason, status = str(error), Status.NOT_BUILT
+    except Exception as error:
+        reason, status = report_error(error).detail, Status.INTERNAL_ERROR
+    building, texts = fragments(Building(id, status, mask(reason)), names, head)
+    selection = finite({**record, "status": status.code, "detail": building.detail})
+    return building, texts | {"parameters": Fragment(dump(selection) + b"\n")}
 
 
 def offset_by(record: Mapping[str, Any] | None, units: FileUnits) -> np.ndarray:

@@ -150,13 +150,11 @@ class Member:
 
     def those(self, which: int | list[int]) -> Member:
         """Select one or some of several."""
-        centre, half, eaves, slopes = (
-            of[:, which] for of in (self.centre, self.half, self.eaves, self.slopes)
+        centre, half, eaves, slopes, leans = (
+            of[:, which] for of in (self.centre, self.half, self.eaves, self.slopes, self.leans)
         )
         cants = self.cants[..., which] if self.cants.shape[1] else no_cants()
-        return Member(
-            self.kappa, centre, half, eaves, slopes, self.top[which], self.leans[:, which], cants
-        )
+        return Member(self.kappa, centre, half, eaves, slopes, self.top[which], leans, cants)
 
     def compute_local_planes(self) -> list[tuple[float, float, float]]:
         """Return planes a, b, c over u, v about the centre: sides in order, cants, the top."""
@@ -182,10 +180,7 @@ class Member:
         side = 2 * axis
         if not (self.has[side] and self.has[side + 1]):
             return math.inf
-        lower = self.eaves[side]
-        upper = self.eaves[side + 1]
-        item = self.slopes[side]
-        other = self.slopes[side + 1]
+        (lower, upper), (item, other) = (of[side : side + 2] for of in (self.eaves, self.slopes))
         # from the low side's eave to the ridge
         run = (upper - lower + 2.0 * self.half[axis] * other) / (item + other)
         return lower + item * run
@@ -196,18 +191,14 @@ class Member:
             return self
         kappa = math.remainder(self.kappa + 0.5 * math.pi * quarters, 2.0 * math.pi)
         sides, leans_turn = TURNS[quarters]
-        half = self.half[::-1].copy() if quarters % 2 else self.half
-        eaves = self.eaves[sides]
-        slopes = self.slopes[sides]
-        leans = (self.leans[sides].T * leans_turn).T
         return Member(
             kappa,
             self.centre,
-            half,
-            eaves,
-            slopes,
+            self.half[::-1].copy() if quarters % 2 else self.half,
+            self.eaves[sides],
+            self.slopes[sides],
             self.top,
-            leans,
+            (self.leans[sides].T * leans_turn).T,
             turn_cants(self.cants, quarters),
         )
 

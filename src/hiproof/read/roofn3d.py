@@ -149,23 +149,12 @@ def naming_row(path: str | Path, number: int) -> Iterator[None]:
 def coordinates(wkt: str) -> np.ndarray:
     """Return points (n, 3) of `MULTIPOINT Z (x y z,x y z,...)`.
 
-    Inner parentheses are optional. An empty field gives (0, 3).
+    Inner parentheses are optional. An empty field gives (0, 3). Raises what shapely does.
 
     >>> coordinates("MULTIPOINT Z (1 2 3,4 5 6.5)").tolist()
     [[1.0, 2.0, 3.0], [4.0, 5.0, 6.5]]
     """
-    start, end = wkt.find("("), wkt.rfind(")")
-    if start < 0 or end < start:
-        if not wkt.strip() or wkt.strip().upper().endswith("EMPTY"):
-            return np.empty((0, 3))
-        raise ValueError(f"{wkt[:40]!r}...{wkt[-20:]!r}")
-    numbers = wkt[start + 1 : end].replace(",", " ").replace("(", " ").replace(")", " ").split()
-    values = np.array(numbers, dtype=float)
-    if len(values) % 3:
-        raise ValueError(
-            f"{count_things(len(values), 'number')}, which is no whole number of x y z"
-        )
-    return values.reshape(-1, 3)
+    return shapely.get_coordinates(shapely.from_wkt(wkt.strip() or "POINT EMPTY"), include_z=True)
 
 
 def polygon(wkt: str) -> shapely.Polygon:

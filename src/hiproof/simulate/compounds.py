@@ -114,12 +114,16 @@ def make_winged(rng: np.random.Generator, layout: CompoundLayout, kind: str) -> 
 
 def regular(type: str, length: float, width: float, slope: float) -> dict[str, float]:
     """Return a gable, hip (four equal slopes, longer than wide) or flat roof."""
-    parameters = {"length": float(length), "width": float(width)}
-    if type != "flat":
-        parameters["height"] = float(width / 2 * slope)
+    parameters = name_sizes(length, width, 0.0 if type == "flat" else width / 2 * slope)
     if type == "hip":
         parameters["ridge_length"] = float(length - width)
     return parameters
+
+
+def name_sizes(length: float, width: float, height: float) -> dict[str, float]:
+    """Return the sizes of a roof by name, of a level one without a height."""
+    sizes = {"length": length, "width": width} | ({"height": height} if height else {})
+    return {name: float(size) for name, size in sizes.items()}
 
 
 def make_extended(rng: np.random.Generator, layout: CompoundLayout) -> list[Part]:
@@ -130,9 +134,7 @@ def make_extended(rng: np.random.Generator, layout: CompoundLayout) -> list[Part
     lean_to = rng.random() < 0.5
     rise = depth * math.tan(math.radians(rng.uniform(8, 25))) if lean_to else 0.0
     z = max(2.0, eave - rise - rng.uniform(0.3, 1.5))
-    annex = {"length": float(span), "width": float(depth)} | (
-        {"height": float(rise)} if lean_to else {}
-    )
+    annex = name_sizes(span, depth, rise)
     u = rng.uniform(-0.5, 0.5) * (house["length"] - span)
     v = -(house["width"] + depth) / 2
     return [
@@ -200,9 +202,7 @@ def make_dormered(rng: np.random.Generator, layout: CompoundLayout) -> list[Part
         v = side * (width / 2 - front - depth / 2)
         quarters = {"gable": 1, "flat": 0, "monopitch": 0 if side < 0 else 2}[shape]
         length, across = (depth, span) if shape == "gable" else (span, depth)
-        parameters = {"length": float(length), "width": float(across)} | (
-            {"height": top[1]} if top[1] else {}
-        )
+        parameters = name_sizes(length, across, top[1])
         parts += [
             layout.part(shape, parameters, float(u), v, eave + top[0], quarters) for u in centres
         ]

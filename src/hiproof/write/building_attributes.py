@@ -119,38 +119,34 @@ def building_attributes(
     in a file whose coordinates are in other `units`, which `hiproof_units` then says. What each is
     stands in data/attributes.toml.
     """
-    input_attributes = {
-        plain_text(name): plain(value) for name, value in building.attributes.items()
-    }
-    computed = {
-        prefix + name: value for name, value in roofer_attributes(building, figures).items()
-    }
-    computed |= {
-        OWN + name: value for name, value in hiproof_attributes(building, figures, units).items()
-    }
-    if osm:
-        computed |= osm_tags(building, figures)
+    further: dict[str, Any] = {}
     if building.built is not None:
         counts = {
             "installations": len(building.built.installations),
             "passages": len(building.built.underside.passages),
         }
-        computed |= {OWN + name: n for name, n in counts.items() if n}
-    if building.built is not None and building.built.eaves is not None:
-        volume = building.built.finest_solid.volume
-        computed[f"{OWN}volume_lod23"] = round_value(volume, 4)
+        further |= {name: n for name, n in counts.items() if n}
+        if building.built.eaves is not None:
+            further["volume_lod23"] = round_value(building.built.finest_solid.volume, 4)
     if building.epochs_used:
-        computed[OWN + "survey_date"] = building.survey_date
-        computed[OWN + "epochs_used"] = " ".join(building.epochs_used)
+        further["survey_date"] = building.survey_date
+        further["epochs_used"] = " ".join(building.epochs_used)
     if building.change is not None:
-        computed |= {
-            OWN + name: value for name, value in change_attributes(building.change).items()
-        }
+        further |= change_attributes(building.change)
     if not units.are_metres:
-        computed[OWN + "units"] = (
-            f"attributes in m, m2 and m3; plan coordinates in {units.plan_name}"
-        )
-    return input_attributes | {name: plain(value) for name, value in computed.items()}
+        further["units"] = f"attributes in m, m2 and m3; plan coordinates in {units.plan_name}"
+    computed = {
+        **add_prefix(prefix, roofer_attributes(building, figures)),
+        **add_prefix(OWN, hiproof_attributes(building, figures, units)),
+        **(osm_tags(building, figures) if osm else {}),
+        **add_prefix(OWN, further),
+    }
+    given = {plain_text(name): plain(value) for name, value in building.attributes.items()}
+    return given | {name: plain(value) for name, value in computed.items()}
+
+
+def add_prefix(prefix: str, values: Mapping[str, Any]) -> dict[str, Any]:
+    return {prefix + name: value for name, value in values.items()}
 
 
 ROOF_HEIGHTS = ("min", "50p", "70p", "max", "ridge")
@@ -161,27 +157,25 @@ QUALITY_FIGURES = (
 
 def roofer_attributes(building: Building, figures: RoofFigures | None) -> dict[str, Any]:
     """Return the attributes that users of roofer and 3DBAG expect, unprefixed."""
-    quality = building.quality
-    if figures is None:
-        shape = dict.fromkeys((*(f"h_roof_{name}" for name in ROOF_HEIGHTS), "volume_lod22"))
-        roof_type, mode = "no points" if building.status is Status.NO_POINTS else "unknown", "skip"
-    else:
-        shape = shape_attributes(figures)
-        roof_type = figures.roofer_type
-        is_block = building.status in FALLBACKS and len(building.parts) == 1
-        mode = "lod11_fallback" if is_block else "standard"
-    return {
+    quality, values = building.quality, dict.fromkeys(TABLES["roofer"].names)
+    values |= {
         "h_ground": metres(find_ground_height(building, figures)),
-        **shape,
-        "roof_type": roof_type,
-        "roof_n_surfaces": None if figures is None else figures.roof_faces,
-        "slope": None if figures is None else round_value(figures.slope_deg, 4),
-        "azimuth": None if figures is None else round_value(figures.azimuth_deg, 4),
+        "roof_type": "no points" if building.status is Status.NO_POINTS else "unknown",
         "rmse_lod22": round_value(quality.rmse),
         "pt_density": round_value(quality.density),
         "nodata_frac": round_value(quality.nodata_share),
-        "extrusion_mode": mode,
+        "extrusion_mode": "skip",
     }
+    if figures is not None:
+        is_block = building.status in FALLBACKS and len(building.parts) == 1
+        values |= shape_attributes(figures) | {
+            "roof_type": figures.roofer_type,
+            "roof_n_surfaces": figures.roof_faces,
+            "slope": round_value(figures.slope_deg, 4),
+            "azimuth": round_value(figures.azimuth_deg, 4),
+            "extrusion_mode": "lod11_fallback" if is_block else "standard",
+        }
+    return values
 
 
 def shape_attributes(figures: RoofFigures) -> dict[str, Any]:

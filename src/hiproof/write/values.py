@@ -102,14 +102,17 @@ def xml_text(value: Any) -> str:
     >>> xml_text("a < b"), xml_text(2.5)
     ('a &lt; b', '2.5')
     """
-    text = str(value)
-    return text if PLAIN.fullmatch(text) else NOT_IN_XML.sub("\ufffd", text).translate(ESCAPES)
+    return escape(value, ESCAPES)
 
 
 def xml_attribute(value: Any) -> str:
     """Return `value` as an attribute's value, between double quotes."""
+    return escape(value, QUOTED)
+
+
+def escape(value: Any, table: dict[int, str]) -> str:
     text = str(value)
-    return text if PLAIN.fullmatch(text) else NOT_IN_XML.sub("\ufffd", text).translate(QUOTED)
+    return text if PLAIN.fullmatch(text) else NOT_IN_XML.sub("\ufffd", text).translate(table)
 
 
 def generic_attribute(name: str, value: Any) -> str:

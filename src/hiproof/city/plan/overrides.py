@@ -119,9 +119,8 @@ def table_records(path: str) -> list[dict[str, Any]]:
     from ...read.outlines.vector_file import translate_read_errors
 
     def read(where: str | None = None) -> tuple[list[str], list[str], list[np.ndarray]]:
-        meta, _, _, columns = translate_read_errors(
-            lambda: pyogrio.raw.read(str(path), read_geometry=False, where=where), path
-        )
+        with translate_read_errors(path):
+            meta, _, _, columns = pyogrio.raw.read(path, read_geometry=False, where=where)
         return list(meta["fields"]), list(meta["dtypes"]), columns
 
     names, declared, columns = read()

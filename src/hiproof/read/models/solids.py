@@ -32,14 +32,11 @@ BUILDING_OBJECT = "BuildingInstallation"
 # City objects whose shells come out by themselves.
 OWNERS = ("Building", "BuildingPart", BUILDING_OBJECT)
 
-SURFACES = {
-    "RoofSurface",
-    "WallSurface",
-    "GroundSurface",
-    "OuterCeilingSurface",
-    "OuterFloorSurface",
-    "ClosureSurface",
-}
+SURFACES = tuple(
+    f"{{*}}{kind}Surface"
+    for kind in ("Roof", "Wall", "Ground", "OuterCeiling", "OuterFloor", "Closure")
+)
+MEMBERS = ("{*}cityObjectMember", "{*}featureMember")
 
 
 def read_solids(path: str | Path, damaged: Damaged = refuse) -> Iterator[tuple[str, Solid]]:
@@ -163,12 +160,12 @@ def citygml_solids(
     members, units, first_name = 0, crs_units or METRES, None
     try:
         for _, element in etree.iterparse(
-            str(path), events=("end",), huge_tree=True, resolve_entities=False
+            str(path), tag=("{*}Envelope", *MEMBERS), huge_tree=True, resolve_entities=False
         ):
-            if local_name(element) == "Envelope" and not members:
-                first_name = element.get("srsName")
-                units = crs_units or find_named_units(first_name)
-            if local_name(element) not in ("cityObjectMember", "featureMember"):
+            if local_name(element) == "Envelope":
+                if not members:
+                    first_name = element.get("srsName")
+                    units = crs_units or find_named_units(first_name)
                 continue
             members += 1
             for name in {part.get("srsName") for part in element.iter()} if first_name else ():
@@ -197,49 +194,44 @@ def find_citygml_crs(path: Path) -> str | None:
     """Return the CRS's name in a CityGML file's first envelope, None before the first object."""
     from lxml import etree
 
+    tags = ("{*}Envelope", *MEMBERS)
     try:
-        for _, element in etree.iterparse(str(path), events=("start",), resolve_entities=False):
-            if local_name(element) in ("Envelope", "cityObjectMember", "featureMember"):
-                name = element.get("srsName")
-                return None if name is None else str(name)
+        for _, element in etree.iterparse(
+            str(path), events=("start",), tag=tags, resolve_entities=False
+        ):
+            return element.get("srsName")
     except (etree.XMLSyntaxError, OSError):
         return None  # who reads the solids says what is wrong
     return None
 
 
 def gml_id(element: Any) -> str | None:
-    for namespace in GML_NAMESPACES:
-        if element.get(f"{{{namespace}}}id"):
-            return element.get(f"{{{namespace}}}id")
-    return None
+    names = (element.get(f"{{{namespace}}}id") for namespace in GML_NAMESPACES)
+    return next(filter(None, names), None)
 
 
 def member_solids(member: Any, path: Path, without: str) -> Iterator[tuple[str, Solid]]:
     """Yield shells of a cityObjectMember; parts and installations with solids have own ids."""
-    polygons = {
-        gml_id(element): element for element in member.iter() if local_name(element) == "Polygon"
-    }
-    owners = [
-        element
-        for element in member.iter()
-        if local_name(element) in OWNERS and local_name(element) != without
-    ]
+    polygons = {gml_id(element): element for element in member.iter("{*}Polygon")}
+    owners = [*member.iter(*(f"{{*}}{kind}" for kind in OWNERS if kind != without))]
     for owner in owners or list(member)[:1]:
-        solids, place = [], f"{gml_id(owner) or 'a building without an id'} in {path}"
-        for element in iterate_own_descendants(owner):
-            if local_name(element) == "Solid":
-                solids += gml_shells(element, polygons, place)
+        place = f"{gml_id(owner) or 'a building without an id'} in {path}"
+        own = list(iterate_own_descendants(owner))
+        shells = (gml_shells(e, polygons, place) for e in own if local_name(e) == "Solid")
+        solids = [solid for of_element in shells for solid in of_element]
         if not solids and local_name(owner) != BUILDING_OBJECT:
-            loose = [element for element in iterate_own_descendants(owner) if is_loose(element)]
+            loose = [element for element in own if is_loose(element)]
             solids = [polygons_solid(loose, place)] if loose else []
         yield from number_solids(gml_id(owner) or "unnamed", solids)
 
 
 def is_loose(element: Any) -> bool:
     """Return whether an element is a polygon of a boundary surface, and not of LoD 0."""
-    if local_name(element) != "Polygon" or surface_kind(element, None) is None:
-        return False
-    return not any(local_name(ancestor).startswith("lod0") for ancestor in element.iterancestors())
+    return (
+        local_name(element) == "Polygon"
+        and next(element.iterancestors(*SURFACES), None) is not None
+        and not any(local_name(a).startswith("lod0") for a in element.iterancestors())
+    )
 
 
 def iterate_own_descendants(owner: Any) -> Iterator[Any]:
@@ -250,23 +242,13 @@ def iterate_own_descendants(owner: Any) -> Iterator[Any]:
             yield from iterate_own_descendants(child)
 
 
-def surface_kind(polygon: Any, default: str | None) -> str | None:
-    """Name of the thematic surface a polygon lies in."""
-    for ancestor in polygon.iterancestors():
-        if local_name(ancestor) in SURFACES:
-            return local_name(ancestor)
-    return default
-
-
 def gml_shells(solid: Any, polygons: dict[str | None, Any], place: str) -> list[Solid]:
     """Return outer and inner shells of a gml:Solid, surfaces by value or by xlink."""
     shells = []
-    for boundary in solid:
-        if local_name(boundary) not in ("exterior", "interior"):
-            continue
+    for boundary in solid.iterchildren("{*}exterior", "{*}interior"):
         members = []
         for element in boundary.iter():
-            reference = element.get(XLINK_HREF) if isinstance(element.tag, str) else None
+            reference = element.get(XLINK_HREF)
             if reference is not None:
                 if reference.lstrip("#") not in polygons:
                     raise InputError(
@@ -287,9 +269,7 @@ def polygons_solid(polygons: list[Any], place: str, inward: bool = False) -> Sol
     defects: list[tuple[int, int]] = []
     for polygon in polygons:
         rings = []
-        for ring in polygon.iter():
-            if local_name(ring) != "LinearRing":
-                continue
+        for ring in polygon.iter("{*}LinearRing"):
             points = ring_points(ring, place)
             if len(points) > 1 and points[0] == points[-1]:
                 points = points[:-1]
@@ -297,15 +277,14 @@ def polygons_solid(polygons: list[Any], place: str, inward: bool = False) -> Sol
                 defects.append((103, len(faces)))
             indices = tuple(number.setdefault(point, len(number)) for point in points)
             rings.append(indices[::-1] if inward else indices)
-        faces.append(Face(tuple(rings), surface_kind(polygon, WALL) or WALL))
+        surface = next(polygon.iterancestors(*SURFACES), None)
+        faces.append(Face(tuple(rings), WALL if surface is None else local_name(surface)))
     return Solid(np.array(list(number), float).reshape(-1, 3), tuple(faces), tuple(defects))
 
 
 def ring_points(ring: Any, place: str) -> list[tuple[float, ...]]:
     """Return the points of a gml:LinearRing from posList or pos."""
-    texts = [
-        element.text or "" for element in ring.iter() if local_name(element) in ("posList", "pos")
-    ]
+    texts = [element.text or "" for element in ring.iter("{*}posList", "{*}pos")]
     try:
         values = [float(word) for word in " ".join(texts).split()]
     except ValueError as error:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -162,14 +163,12 @@ def read_vector_file(
     Geometries are shapely's, None where a feature has none. `make_box` gives the box to read in the
     layer's CRS.
     """
-    source, layer = translate_read_errors(
-        lambda: find_source(str(path), choose_layer(path, layer)), path
-    )
-    info = translate_read_errors(lambda: pyogrio.read_info(source, layer=layer), path)
+    with translate_read_errors(path):
+        source, layer = find_source(str(path), choose_layer(path, layer))
+        info = pyogrio.read_info(source, layer=layer)
     selection = {"where": where, "bbox": make_box(info["crs"])}
-    meta, numbers, wkb, columns, as_text = translate_read_errors(
-        lambda: read_layer(source, layer, **selection), path, info
-    )
+    with translate_read_errors(path, info):
+        meta, numbers, wkb, columns, as_text = read_layer(source, layer, **selection)
     if as_text:
         names = ", ".join(as_text)
         warnings.warn(
@@ -183,14 +182,9 @@ def read_vector_file(
 
     def read_column(name: str) -> np.ndarray:
         # of all columns: in some formats those left out are empty to the condition as well
-        known_values: dict[str, Any] = {
-            **selection,
-            "layer": layer,
-            "where": make_known_condition(name, where),
-        }
-        entries, *_, values, _ = translate_read_errors(
-            lambda: read_layer(source, read_geometry=False, **known_values), path, info
-        )
+        known = {**selection, "where": make_known_condition(name, where)}
+        with translate_read_errors(path, info):
+            entries, *_, values, _ = read_layer(source, layer, read_geometry=False, **known)
         return values[list(entries["fields"]).index(name)]
 
     return (
@@ -203,18 +197,16 @@ def read_vector_file(
 
 def vector_file_crs(path: str | Path, layer: str | int | None) -> str | None:
     """Return the CRS that a layer names, in GDAL's form."""
-    source, layer = translate_read_errors(
-        lambda: find_source(str(path), choose_layer(path, layer)), path
-    )
-    return translate_read_errors(lambda: pyogrio.read_info(source, layer=layer), path)["crs"]
+    with translate_read_errors(path):
+        source, layer = find_source(str(path), choose_layer(path, layer))
+        return pyogrio.read_info(source, layer=layer)["crs"]
 
 
 def choose_layer(path: str | Path, layer: str | int | None) -> str | int | None:
     """Return `layer`, or the only one with geometries; InputError lists several."""
     if layer is not None:
         return layer
-    layer_names = translate_read_errors(lambda: list_layers(str(path)), path)
-    layers = [name for name, geometry in layer_names if geometry is not None]
+    layers = [name for name, geometry in list_layers(str(path)) if geometry is not None]
     if len(layers) > 1:
         raise InputError(
             f"expected one layer of footprints in {path}, got {len(layers)}: "
@@ -223,10 +215,9 @@ def choose_layer(path: str | Path, layer: str | int | None) -> str | int | None:
     return layers[0] if layers else None
 
 
-def translate_read_errors(
-    read: Callable[[], Any], path: str | Path, info: dict[str, Any] | None = None
-) -> Any:
-    """Call `read()` and turn pyogrio's errors into InputErrors.
+@contextmanager
+def translate_read_errors(path: str | Path, info: dict[str, Any] | None = None) -> Iterator[None]:
+    """Turn pyogrio's errors in the block into InputErrors.
 
     The error lists the layers where that helps. With the `info` of a layer it lists the attributes
     for a condition that does not fit them.
@@ -235,7 +226,7 @@ def translate_read_errors(
         with warnings.catch_warnings():
             # pyogrio remarks on measured geometries and mixed layers, which are fine
             warnings.simplefilter("ignore")
-            return read()
+            yield
     # ValueError: a condition on other files than databases
     except (FeatureError, ValueError) as error:
         if info is None or "SQL" not in str(error):

@@ -14,7 +14,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import BinaryIO, NamedTuple
+from typing import BinaryIO
 
 import laspy
 import lazrs
@@ -41,16 +41,14 @@ def copc_points(
     form = laspy.LasHeader.read_from(file, read_evlrs=False).point_format
     points = laspy.PackedPointRecord.zeros(int(nodes["points"].sum()), form)
     if len(nodes):
-        compressed = np.frombuffer(
-            b"".join(read_node_bytes(file, node) for node in nodes), np.uint8
-        )
+        compressed = np.frombuffer(b"".join(read_node(file, node) for node in nodes), np.uint8)
         laszip = np.frombuffer(facts.laszip, np.uint8)
         content, selection = points.array.view(np.uint8), SELECTION.to_lazrs()
         lazrs.decompress_points_with_chunk_table(compressed, laszip, content, chunks, selection)
     return nodes, take_fields(points, facts)
 
 
-def read_node_bytes(file: BinaryIO, node: np.void) -> bytes:
+def read_node(file: BinaryIO, node: np.void) -> bytes:
     file.seek(int(node["start"]))
     return file.read(int(node["bytes"]))
 
@@ -97,12 +95,7 @@ SELECTION = (
 )
 
 
-class Decoded(NamedTuple):
-    """Coordinates (n, 3), classes (n,), and whether a point is withheld (n,)."""
-
-    xyz: np.ndarray
-    classes: np.ndarray
-    is_withheld: np.ndarray
+Decoded = tuple[np.ndarray, np.ndarray, np.ndarray]  # xyz (n, 3), classes (n,), withheld (n,)
 
 
 def read_points(
@@ -129,8 +122,7 @@ def read_points(
 def take_fields(points: laspy.PackedPointRecord, facts: LasFacts) -> Decoded:
     """Take from the records of points what hiproof needs."""
     xyz = np.column_stack([points.X, points.Y, points.Z]) * facts.scales + facts.offsets
-    classes = np.array(points.classification, np.uint8)
-    return Decoded(xyz, classes, np.array(points.withheld, bool))
+    return xyz, np.array(points.classification, np.uint8), np.array(points.withheld, bool)
 
 
 # xyz (n, 3) float64, classification (n,) uint8 or None
@@ -196,15 +188,13 @@ def las_chunks(
     lower, upper = np.full(3, np.inf), np.full(3, -np.inf)
     parts = [(0, facts.count)] if runs is None else runs.tolist()
     with translate_errors(path), open_binary(path) as file:
-        for points in read_points(file, facts, parts, chunk_points):
-            xyz = points.xyz
+        for xyz, classes, is_withheld in read_points(file, facts, parts, chunk_points):
             lowest, highest = check_points(xyz, facts)
             lower, upper = np.minimum(lower, lowest), np.maximum(upper, highest)
             if noted is not None:
                 noted.append(compute_run_boxes(xyz))
-            chunk = drop_withheld(xyz, points)
-            left_out += len(xyz) - len(chunk[0])
-            yield chunk
+            left_out += int(is_withheld.sum())
+            yield xyz[~is_withheld], classes[~is_withheld]
         if runs is None and facts.count:
             check_all_points(lower, upper, facts)
     log_withheld(left_out, path)
@@ -224,22 +214,13 @@ def copc_chunk(path: str | Path, box: tuple[float, float, float, float]) -> Chun
             raise Implausible(
                 "its first record says that it is COPC, and none tells of an octree; it is damaged"
             )
-        nodes, points = copc_points(file, facts, facts.octree, box)
-        xyz = points.xyz
+        nodes, (xyz, classes, is_withheld) = copc_points(file, facts, facts.octree, box)
         lower, upper = check_points(xyz, facts)
         check_nodes(xyz, nodes, facts, facts.octree)
         if 0 < len(xyz) == facts.count:
             check_all_points(lower, upper, facts)
-        chunk = drop_withheld(xyz, points)
-    log_withheld(len(xyz) - len(chunk[0]), path)
-    return chunk
-
-
-def drop_withheld(xyz: np.ndarray, points: Decoded) -> Chunk:
-    """Return coordinates (n, 3) and classes without withheld (deleted) points."""
-    if not points.is_withheld.any():
-        return xyz, points.classes
-    return xyz[~points.is_withheld], points.classes[~points.is_withheld]
+    log_withheld(int(is_withheld.sum()), path)
+    return xyz[~is_withheld], classes[~is_withheld]
 
 
 def log_withheld(count: int, path: str | Path) -> None:

@@ -58,15 +58,18 @@ READERS = {
 
 POINT_SUFFIXES = tuple(suffix for reader in READERS.values() for suffix in reader.suffixes)
 FORMAT_NAMES = " or ".join(", ".join(reader.name for reader in READERS.values()).rsplit(", ", 1))
-PACKED = {
-    b"\x1f\x8b": "gunzip",
-    b"PK\x03\x04": "unzip",
-    b"BZh": "bunzip2",
-    b"\xfd7zX": "unxz",
-    b"7z\xbc\xaf": "7z x",
+CONVERT_FIRST = "{}; convert it first (`pdal translate {{path}} {{laz}}`)"
+UNPACK_FIRST = "a packed file; unpack it first: {} {{path}}"
+# what files of other kinds are, by their first bytes, and what to do with them
+OTHER_KINDS = {
+    b"ASTM-E57": CONVERT_FIRST.format("E57"),
+    b"# .PCD": CONVERT_FIRST.format("PCD"),
+    b"\x1f\x8b": UNPACK_FIRST.format("gunzip"),
+    b"PK\x03\x04": UNPACK_FIRST.format("unzip"),
+    b"BZh": UNPACK_FIRST.format("bunzip2"),
+    b"\xfd7zX": UNPACK_FIRST.format("unxz"),
+    b"7z\xbc\xaf": UNPACK_FIRST.format("7z x"),
 }
-# point clouds of other kinds, by their first bytes
-ELSEWHERE = {b"ASTM-E57": "E57", b"# .PCD": "PCD"}
 CHUNK_POINTS = 5 * RUN_POINTS  # 30 MB while they are sorted
 
 COARSE_STEP_M = (
@@ -357,18 +360,10 @@ def file_kind(path: str | Path) -> str:
     for kind, reader in READERS.items():
         if head.startswith(reader.start) if reader.start else suffix in reader.suffixes:
             return kind
-    for start, name in ELSEWHERE.items():
+    for start, other in OTHER_KINDS.items():
         if head.startswith(start):
-            raise InputError(
-                f"expected {FORMAT_NAMES} at {path}, got {name}; convert it first (`pdal translate "
-                f"{path} {Path(path).with_suffix('.laz')}`)"
-            )
-    for start, program in PACKED.items():
-        if head.startswith(start):
-            raise InputError(
-                f"expected {FORMAT_NAMES} at {path}, got a packed file; unpack it first: {program} "
-                f"{path}"
-            )
+            got = other.format(path=path, laz=Path(path).with_suffix(".laz"))
+            raise InputError(f"expected {FORMAT_NAMES} at {path}, got {got}")
     got = (
         "something else" if suffix in POINT_SUFFIXES else f"a file ending in {suffix or 'nothing'}"
     )

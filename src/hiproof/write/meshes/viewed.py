@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from ..colours import GROUND_COLOUR, WALL_COLOUR, type_colour, type_colours
 from ..fragments import Sheet
 from ..parameters import numbers, part_record
 
+T = TypeVar("T")
 SHOWN_PART_KEYS = ("type", "parameters", "position", "rotation")
 
 
@@ -40,18 +41,18 @@ class ViewedModel(NamedTuple):
 
     def faces_by_look(self) -> dict[Look, list[Face]]:
         """Group roofs, walls, grounds and ceilings by their look."""
-        result: dict[Look, list[Face]] = {}
-        for kind in (ROOF, WALL, GROUND, CEILING):
-            for face in self.solid.select_faces(kind):
-                result.setdefault(choose_look(face, self.part_types), []).append(face)
-        return result
+        return self.group_faces(lambda face: choose_look(face, self.part_types))
 
     def faces_by_element(self) -> dict[tuple[str, int], list[Face]]:
         """Group the roof faces of each part, walls, grounds and ceilings, by kind and part."""
-        result: dict[tuple[str, int], list[Face]] = {}
+        return self.group_faces(lambda face: (face.kind, face.part if face.kind == ROOF else 0))
+
+    def group_faces(self, name: Callable[[Face], T]) -> dict[T, list[Face]]:
+        """Group roofs, then walls, grounds and ceilings, by what `name` gives."""
+        result: dict[T, list[Face]] = {}
         for kind in (ROOF, WALL, GROUND, CEILING):
             for face in self.solid.select_faces(kind):
-                result.setdefault((kind, face.part if kind == ROOF else 0), []).append(face)
+                result.setdefault(name(face), []).append(face)
         return result
 
 
