@@ -32,11 +32,8 @@ def test_coordinates_classes_and_withheld_points_are_those_of_laspy(tmp_path, po
     kept = np.concatenate([np.arange(*run) for run in runs])
     with open(tmp_path / f"cloud.{ending}", "rb") as file:
         chunks = list(read_points(file, read_facts(file), runs, 20_000))
-    assert max(len(chunk.classes) for chunk in chunks) == 20_000
-    for name, truth in (
-        ("xyz", expected.xyz),
-        ("classes", np.array(expected.classification)),
-        ("is_withheld", np.array(expected.withheld, bool)),
-    ):
-        read = np.concatenate([getattr(chunk, name) for chunk in chunks])
-        np.testing.assert_array_equal(read, truth[kept])
+    assert max(len(classes) for _, classes, _ in chunks) == 20_000
+    withheld = np.array(expected.withheld, bool)
+    truths = expected.xyz, np.array(expected.classification), withheld
+    for column, truth in zip(zip(*chunks, strict=True), truths, strict=True):
+        np.testing.assert_array_equal(np.concatenate(column), truth[kept])

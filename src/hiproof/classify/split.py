@@ -7,7 +7,6 @@ import warnings
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -55,19 +54,11 @@ class FoundBuilding:
     points were split into houses, or while roofs were looked for among them.
     """
 
-    id: str
     index: np.ndarray
     area: shapely.Geometry
+    error: ErrorReport | None = None
     is_cut_out: bool = False
-    error: ErrorReport | None = None
-
-
-class RoofPoints(NamedTuple):
-    """The points (ascending indices) and area of one building, or of where the search failed."""
-
-    members: np.ndarray
-    area: shapely.Geometry
-    error: ErrorReport | None = None
+    id: str = ""
 
 
 def split_buildings(
@@ -96,8 +87,7 @@ def split_buildings(
     read = (settings or Settings()).read
     roof, is_cut_out, failed = select_roof_points(cloud, read, box, progress)
     houses = divide_roof_points(roof, cloud.xyz, read, is_cut_out, box, progress)
-    places = name_places([*houses, *failed], cloud.xyz)
-    return [dataclasses.replace(item, is_cut_out=is_cut_out) for item in places]
+    return name_places([*houses, *failed], cloud.xyz, is_cut_out)
 
 
 def divide_roof_points(
@@ -107,7 +97,7 @@ def divide_roof_points(
     is_cut_out: bool,
     box: Box | None = None,
     progress: Progress = ignore,
-) -> list[RoofPoints]:
+) -> list[FoundBuilding]:
     """Divide the `roof` points (indices) among buildings, those that may meet a `box`."""
     if not len(roof):
         return []
@@ -176,7 +166,7 @@ def select_large_groups(
 
 def select_roof_points(
     cloud: PointCloud, read: ReadSettings, box: Box | None = None, progress: Progress = ignore
-) -> tuple[np.ndarray, bool, list[RoofPoints]]:
+) -> tuple[np.ndarray, bool, list[FoundBuilding]]:
     """Return ascending indices of the points that may be roofs.
 
     With them come whether they are roofs alone, cut out beforehand, and the places where the search
@@ -195,7 +185,7 @@ def select_roof_points(
         return unclassified, True, []
     if unclassified is not None and is_roofs_only(cloud.xyz[unclassified]):
         return unclassified, True, []
-    failed: list[RoofPoints] = []
+    failed: list[FoundBuilding] = []
     search = RoofSearch(
         cloud,
         read.ground_classes,
@@ -314,37 +304,39 @@ def connected_groups(xy: np.ndarray, gap_m: float) -> list[np.ndarray]:
     return np.split(order, np.cumsum(np.bincount(group_of))[:-1])
 
 
-def name_places(places: list[RoofPoints], xyz: np.ndarray) -> list[FoundBuilding]:
+def name_places(
+    places: list[FoundBuilding], xyz: np.ndarray, is_cut_out: bool
+) -> list[FoundBuilding]:
     """Give each place the id B_<x>_<y> of the metre that holds the middle of its box."""
     in_use: Counter[str] = Counter()
     result = []
-    for index, area, error in places:
-        xy = xyz[index, :2]
+    for place in places:
+        xy = xyz[place.index, :2]
         x, y = np.floor((xy.min(axis=0) + xy.max(axis=0)) / 2).astype(int)
         id = f"B_{x}_{y}"
         in_use[id] += 1
         id = id if in_use[id] == 1 else f"{id}_{in_use[id]}"
-        result.append(FoundBuilding(id, index, area, error=error))
+        result.append(dataclasses.replace(place, id=id, is_cut_out=is_cut_out))
     return result
 
 
 def houses_or_error(
     group: np.ndarray, xyz: np.ndarray, gap_m: float, split_houses: bool
-) -> list[RoofPoints]:
+) -> list[FoundBuilding]:
     """Divide a group of points into houses, or keep it whole with the error."""
     try:
         return [
-            RoofPoints(index, shapely.make_valid(area))
+            FoundBuilding(index, shapely.make_valid(area))
             for index, area in find_houses(group, xyz, gap_m, split_houses)
         ]
     except Exception as error:
         return [make_failed_place(group, xyz, error)]
 
 
-def make_failed_place(index: np.ndarray, xyz: np.ndarray, error: Exception) -> RoofPoints:
+def make_failed_place(index: np.ndarray, xyz: np.ndarray, error: Exception) -> FoundBuilding:
     """Make the box of the points `index` with the error that happened there."""
     xy = xyz[index, :2]
-    return RoofPoints(index, shapely.box(*xy.min(axis=0), *xy.max(axis=0)), report_error(error))
+    return FoundBuilding(index, shapely.box(*xy.min(axis=0), *xy.max(axis=0)), report_error(error))
 
 
 def find_houses(

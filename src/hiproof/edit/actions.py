@@ -15,7 +15,7 @@ from ..parametric.building import build
 from ..parametric.change import changed_part
 from ..parametric.edit import BY_HAND
 from ..parametric.record import list_at, number, place, read_building, require_mapping
-from ..parametric.refit import measure_building, refit_parts, refit_parts_freely, select_inside
+from ..parametric.refit import measure_building, note_fit, refit_parts, select_inside
 from ..settings import Settings
 from ..status import Status
 
@@ -49,7 +49,7 @@ def apply_edit(
         settings.compose,
     )
     result = dataclasses.replace(result, quality=Quality())  # no figure of the earlier model stays
-    result = refit_parts_freely(result) if action == "refit" else result
+    result = note_fit(result) if action == "refit" else result
     local = result.roof.frame.to_local(points)
     return measure_building(result, local) if is_measured and len(local) else result
 

@@ -186,7 +186,7 @@ def read_rows(path: Path) -> tuple[FileHead, list[BuildingRow]]:
     try:
         with path.open("rb") as file:
             result = objects(lines(file), path, left_out)
-            head = read_head(next(result, None), path)
+            head = read_head(next(result, (1, None))[1], path)
             undamaged = ((number, record) for number, record in result if record is not DAMAGED)
             rows = [
                 read_row(number, record, starts[number - 1], path) for number, record in undamaged

@@ -145,16 +145,7 @@ def enrich_run(
     refuse_unusable(settings)
     parameters = run / FORMATS["parameters"].file if run.is_dir() else run
     out = out or parameters.parent / FOLDER
-    if (out / FORMATS["parameters"].file).exists():
-        raise OutputError(
-            f"expected a folder for enriched files, got {out}, which holds a run; choose another "
-            "--out"
-        )
-    if not parameters.is_file():
-        raise InputError(
-            f"expected the output folder of `hiproof reconstruct`, got no {parameters}; check the "
-            "path"
-        )
+    refuse_places(parameters, out)
     index = index_records(parameters, settings.use_attribute)
     if len(index.offsets):
         refuse_missing_use(index.attributes, settings.use_attribute)
@@ -169,13 +160,43 @@ def enrich_run(
     waiting = make_waiting_folder(out, parameters, settings)
     with atomic_file(waiting / "index.npz") as file:
         np.savez(file, **index._asdict())
-    total = len(records)
-    blocks = list_blocks(waiting, total)
+    blocks = list_blocks(waiting, len(records))
+    enrich_blocks(str(parameters), settings, blocks, processes, progress)
+    files, failures = join_blocks(blocks, find_head(records, settings), out)
+    result = Enriched(list(files.values()), len(records), failures)
+    write_record(parameters.parent, out, settings, result)
+    shutil.rmtree(waiting.parent, ignore_errors=True)
+    return result
+
+
+def refuse_places(parameters: Path, out: Path) -> None:
+    """Raise OutputError where `out` holds a run, InputError without `parameters`."""
+    if (out / FORMATS["parameters"].file).exists():
+        raise OutputError(
+            f"expected a folder for enriched files, got {out}, which holds a run; choose another "
+            "--out"
+        )
+    if not parameters.is_file():
+        raise InputError(
+            f"expected the output folder of `hiproof reconstruct`, got no {parameters}; check the "
+            "path"
+        )
+
+
+def enrich_blocks(
+    parameters: str,
+    settings: EnrichSettings,
+    blocks: list[tuple[Path, int, int]],
+    processes: int | None,
+    progress: Callable[[int, int], None],
+) -> None:
+    """Make the blocks that are missing, in parallel."""
     missing = [block for block in blocks if not block[0].is_file()]
+    total = blocks[-1][2] if blocks else 0
     done = total - sum(last - first for _, first, last in missing)
     executor = make_executor(processes or as_many_as_pay(total, len(missing)))
     try:
-        tasks = ((str(parameters), settings, str(block[0]), *block[1:]) for block in missing)
+        tasks = ((parameters, settings, str(file), first, last) for file, first, last in missing)
         for task, _, error in executor.run(enrich_block, tasks):
             if error is not None:
                 raise error
@@ -183,11 +204,6 @@ def enrich_run(
             progress(done, total)
     finally:
         executor.close()
-    files, failures = join_blocks(blocks, find_head(records, settings), out)
-    result = Enriched(list(files.values()), total, failures)
-    write_record(parameters.parent, out, settings, result)
-    shutil.rmtree(waiting.parent, ignore_errors=True)
-    return result
 
 
 def warn_without_residential(uses: np.ndarray, name: str) -> None:

@@ -61,12 +61,10 @@ def refit(
     """Fit the parts of the building to `points` again; see `Building.refit`."""
     record, local = building_record(building), select_inside(building.roof, points)
     parts = refit_parts(building.roof, record["parts"], local, fixed or {})
-    return measure_building(
-        refit_parts_freely(rebuild(building, {**record, "parts": parts})), local
-    )
+    return measure_building(note_fit(rebuild(building, {**record, "parts": parts})), local)
 
 
-def refit_parts_freely(building: Building) -> Building:
+def note_fit(building: Building) -> Building:
     """Return the building with a detail that its parts were fitted."""
     return dataclasses.replace(building, detail=f"{building.detail}, fitted to its points")
 

@@ -11,7 +11,7 @@ from ..primitives.cants import MEASURES, MOST_CANTS
 from ..primitives.catalogue import CATALOGUE
 from ..read.crs import NAMED_UNITS
 from ..status import Change, ChangeKind, Grade, Status
-from ..write.attribute_list import TABLES, Attribute
+from ..write.attribute_list import TABLES
 from ..write.parameters import VERSION
 from .building import BOX_SIZES
 
@@ -85,18 +85,17 @@ def schema() -> dict[str, Any]:
 def describe_record(name: str) -> dict[str, Any]:
     """Return the schema of an object; only a head may have further keys."""
     table = TABLES[name]
+    properties = {}
+    for attribute in table.attributes:
+        unit = f" [{attribute.unit}]" if attribute.unit else ""
+        meaning = {"description": attribute.meaning + unit}
+        properties[attribute.name] = meaning | describe_type(attribute.type)
     return {
         "type": "object",
-        "properties": {a.name: describe_attribute(a) for a in table.attributes},
+        "properties": properties,
         "required": list(table.required),
         **({} if name == "head" else {"additionalProperties": False}),
     }
-
-
-def describe_attribute(attribute: Attribute) -> dict[str, Any]:
-    """Return the schema of an attribute, with its meaning and unit."""
-    unit = f" [{attribute.unit}]" if attribute.unit else ""
-    return {"description": attribute.meaning + unit, **describe_type(attribute.type)}
 
 
 def describe_type(type: str) -> dict[str, Any]:

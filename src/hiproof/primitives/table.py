@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import tomllib
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 from types import CodeType
@@ -65,6 +66,44 @@ def evaluate(
         raise KeyError(error.name) from error
 
 
+@dataclass(frozen=True)
+class RowFunctions:
+    """What a row's expressions say of parameters; they may name `constants`."""
+
+    row: Mapping[str, Any]
+    constants: Mapping[str, Any]
+    names: tuple[str, ...]
+
+    def shape(self, p: Mapping[str, float]) -> Shape:
+        v, u = p["width"] / 2, p["length"] / 2
+        q = evaluate(self.row["q"], {**p, **self.constants, "u": u, "v": v})
+        return (v, u, *q, *[0.0] * (4 - len(q)))
+
+    def corners(self, p: Mapping[str, float]) -> Any:
+        names = {**p, **self.constants, "u": p["length"] / 2, "v": p["width"] / 2}
+        return evaluate(self.row["corners"], names, self.row.get("where"))
+
+    def typical(self, width: float, length: float, height: float) -> dict[str, float]:
+        sizes = {"width": width, "length": length, "height": height}
+        return self.choose_sizes(self.row.get("typical", {}), sizes)
+
+    def draw(self, rng: np.random.Generator, width: float) -> dict[str, float]:
+        chances = {
+            "uniform": lambda start, end: float(rng.uniform(start, end)),
+            "slope": lambda start, end: math.tan(math.radians(rng.uniform(start, end))),
+            "integers": lambda start, end: float(rng.integers(start, end)),
+            "random": rng.random,
+        }
+        return self.choose_sizes(self.row["draw"], {"width": width, **chances})
+
+    def choose_sizes(self, texts: Mapping[str, str], names: Mapping[str, Any]) -> dict[str, float]:
+        """Return the parameters of sizes that are chosen one after the other."""
+        chosen = {**self.constants, **names}
+        for name, text in texts.items():
+            chosen[name] = evaluate(text, chosen)
+        return {name: chosen[name] for name in self.names}
+
+
 def make_shape(key: str, constants: Mapping[str, Any] | None = None, **changes: Any) -> Primitive:
     """Return a row's shape with `changes`; its expressions may name `constants`."""
     row, constants = SHAPE_ROWS[key], constants or {}
@@ -72,47 +111,19 @@ def make_shape(key: str, constants: Mapping[str, Any] | None = None, **changes: 
     measures = {"width": 2 * V, "length": 2 * U} | {
         name: formula(evaluate(text, symbols)) for name, text in row.get("measures", {}).items()
     }
-
-    def shape(p: Mapping[str, float]) -> Shape:
-        v, u = p["width"] / 2, p["length"] / 2
-        q = evaluate(row["q"], {**p, **constants, "u": u, "v": v})
-        return (v, u, *q, *[0.0] * (4 - len(q)))
-
-    def corners(p: Mapping[str, float]) -> Any:
-        names = {**p, **constants, "u": p["length"] / 2, "v": p["width"] / 2}
-        return evaluate(row["corners"], names, row.get("where"))
-
-    def choose_sizes(texts: Mapping[str, str], names: Mapping[str, Any]) -> dict[str, float]:
-        """Return the parameters of sizes that are chosen one after the other."""
-        chosen = {**constants, **names}
-        for name, text in texts.items():
-            chosen[name] = evaluate(text, chosen)
-        return {name: chosen[name] for name in measures}
-
-    def typical(width: float, length: float, height: float) -> dict[str, float]:
-        sizes = {"width": width, "length": length, "height": height}
-        return choose_sizes(row.get("typical", {}), sizes)
-
-    def draw(rng: np.random.Generator, width: float) -> dict[str, float]:
-        chances = {
-            "uniform": lambda start, end: float(rng.uniform(start, end)),
-            "slope": lambda start, end: math.tan(math.radians(rng.uniform(start, end))),
-            "integers": lambda start, end: float(rng.integers(start, end)),
-            "random": rng.random,
-        }
-        return choose_sizes(row["draw"], {"width": width, **chances})
-
+    functions = RowFunctions(row, constants, tuple(measures))
+    citygml_code, adv_code, *osm_shapes = row["codes"]
     fields: dict[str, Any] = {
         "name": row.get("variant_of", key),
-        "citygml_code": row["codes"][0],
-        "adv_code": row["codes"][1],
-        "osm_shape": row["codes"][2] if len(row["codes"]) > 2 else None,
+        "citygml_code": citygml_code,
+        "adv_code": adv_code,
+        "osm_shape": next(iter(osm_shapes), None),
         "measures": measures,
         "eave": formula(evaluate(row["eave"], symbols)),
-        "shape": shape,
-        "corners": corners,
-        "typical": typical,
-        "draw": draw if "draw" in row else None,
+        "shape": functions.shape,
+        "corners": functions.corners,
+        "typical": functions.typical,
+        "draw": functions.draw if "draw" in row else None,
         "bounds": evaluate(row.get("bounds", ""), LIMITS),
         "starts": read_starts(row.get("starts", []), symbols),
         "signed": tuple(row.get("signed", ())),

@@ -8,7 +8,18 @@ from ..errors import HiproofError
 from ..log import count_things
 
 
-@click.group(no_args_is_help=True)
+class Simulator(click.Group):
+    """Commands whose errors are sentences."""
+
+    def invoke(self, ctx: click.Context) -> None:
+        try:
+            super().invoke(ctx)
+        except HiproofError as error:
+            click.echo(f"error: {error}", err=True)
+            raise click.exceptions.Exit(2) from error
+
+
+@click.group(cls=Simulator, no_args_is_help=True)
 def app() -> None:
     """Simulated towns with their truth."""
 
@@ -23,11 +34,7 @@ def neighbourhood(out: Path, seed: int) -> None:
     """
     from .neighbourhood import write_neighbourhood
 
-    try:
-        counts = write_neighbourhood(out, seed)
-    except HiproofError as error:
-        click.echo(f"error: {error}", err=True)
-        raise click.exceptions.Exit(2) from error
+    counts = write_neighbourhood(out, seed)
     click.echo(
         f"{count_things(counts['buildings'], 'building')}, "
         f"{count_things(counts['points'], 'point')} in {out}"
@@ -48,16 +55,12 @@ def city(out: Path, buildings: int, density: float, tile: float, seed: int) -> N
     from .city import City, write_city
 
     total = 0
-    try:
-        for counts in write_city(out, City(buildings, seed, density, tile)):
-            total += counts.points
-            click.echo(
-                f"{counts.tile}: {count_things(counts.buildings, 'building')}, "
-                f"{count_things(counts.points, 'point')}"
-            )
-    except HiproofError as error:
-        click.echo(f"error: {error}", err=True)
-        raise click.exceptions.Exit(2) from error
+    for counts in write_city(out, City(buildings, seed, density, tile)):
+        total += counts.points
+        click.echo(
+            f"{counts.tile}: {count_things(counts.buildings, 'building')}, "
+            f"{count_things(counts.points, 'point')}"
+        )
     click.echo(f"{count_things(buildings, 'building')}, {count_things(total, 'point')} in {out}")
 
 
