@@ -306,6 +306,8 @@ def refuse_other_types(record: Mapping[str, Any], table: str, label: str = "") -
                 place(value, name, coordinate)
             elif type == "polygon?":
                 polygon(value, name)
+    if table == "roof_outside":
+        number(record.get("area"), f"area of {label}")
     if table == "change_place" and len(list_at(record, "parts")) not in (0, 2):
         raise InputError(
             f"expected the earlier and the new part of {label}, got {excerpt(record['parts'])}; "
