@@ -14,13 +14,13 @@ Modules are imported when a file of theirs is asked for.
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import dataclass, field
-from importlib import import_module, resources
+from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from .data_files import read_data_file
 from .settings import Settings, WriteSettings
 
 
@@ -37,12 +37,7 @@ class Format:
     given: dict[str, Any] = field(default_factory=dict)
 
 
-FORMATS = {
-    name: Format(**row)
-    for name, row in tomllib.loads(
-        (resources.files("hiproof") / "data" / "formats.toml").read_text(encoding="utf-8")
-    ).items()
-}
+FORMATS = {name: Format(**row) for name, row in read_data_file("formats").items()}
 # What `hiproof convert` writes: the parameters are what it reads.
 CONVERTED = {name: format for name, format in FORMATS.items() if name != "parameters"}
 

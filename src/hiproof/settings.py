@@ -8,19 +8,17 @@ from __future__ import annotations
 import dataclasses
 import tomllib
 from dataclasses import dataclass, field, fields
-from importlib import resources
 from numbers import Integral
 from pathlib import Path
 from typing import Any
 
+from .data_files import read_data_file
 from .errors import SettingsError
 
 LARGEST_INTEGER = 10**15  # no number of a setting without bounds is larger
 
 
-SETTING_ROWS = tomllib.loads(
-    (resources.files("hiproof") / "data" / "settings.toml").read_text(encoding="utf-8")
-)
+SETTING_ROWS = read_data_file("settings")
 # What stands for the entries that a setting does not have in data/settings.toml.
 UNDECLARED = {
     **dict.fromkeys(("unit", "option", "names"), ""),

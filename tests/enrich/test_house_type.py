@@ -8,7 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hiproof.enrich.answer import answer, count_storeys, measure_floors, storey_heights
+from hiproof.enrich.answer import (
+    OTHER_STOREY_M,
+    RESIDENTIAL_STOREY_M,
+    answer,
+    count_storeys,
+    measure_floors,
+)
 from hiproof.enrich.run import enrich_run
 from hiproof.errors import InputError, InputWarning
 from hiproof.parametric.building import build
@@ -112,7 +118,7 @@ def test_floor_areas_of_a_block_and_of_an_attic(tmp_path):
 def test_storeys_and_floor_areas_are_consistent(eave_mm, rise, is_home):
     eave = eave_mm / 1000
     solid = build(place_house("a", 0, 0, eave=eave, rise=rise)).solid
-    low, high = storey_heights(is_home)
+    low, high = RESIDENTIAL_STOREY_M if is_home else OTHER_STOREY_M
     least, greatest = count_storeys(eave, (low, high))
     smallest, largest = measure_floors(solid, 0.0, eave, (low, high))
     assert 1 <= least <= greatest and (greatest == 1 or greatest * low <= eave + 1e-6)

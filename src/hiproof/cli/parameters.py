@@ -10,21 +10,18 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
-import tomllib
 from collections.abc import Callable, Iterable
 from enum import Enum
-from importlib import resources
 from pathlib import Path
 from types import NoneType
 from typing import Any, get_args, get_origin
 
 import click
 
+from ..data_files import read_data_file
 from ..settings import Settings, toml_value
 
-COMMANDS: dict[str, dict[str, Any]] = tomllib.loads(
-    (resources.files("hiproof") / "data" / "commands.toml").read_text(encoding="utf-8")
-)
+COMMANDS: dict[str, dict[str, Any]] = read_data_file("commands")
 SHARED_PARAMETERS = COMMANDS.pop("shared")
 MAIN_HEADING, FURTHER_HEADING = "Options", "Further options"
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -109,10 +110,6 @@ HIGHEST_PLINTH_M = 0.6  # height (m) of a ground floor over the ground that hous
 HEADROOM_M = 1.5  # height (m) below the roof from which a floor counts as area
 
 
-def storey_heights(is_residential: bool) -> tuple[float, float]:
-    return RESIDENTIAL_STOREY_M if is_residential else OTHER_STOREY_M
-
-
 def count_storeys(eave_m: float, heights: tuple[float, float]) -> tuple[int, int]:
     """Return the least and the greatest number of full storeys below the eaves.
 
@@ -179,7 +176,7 @@ def find_ridge_direction(solid: Solid) -> float | None:
     for number, face in enumerate(solid.faces):
         if face.kind == ROOF:
             for ring in face.rings:
-                pairs = zip(ring, (*ring[1:], ring[0]), strict=True)
+                pairs = pairwise((*ring, ring[0]))
                 sides |= {(start, end): number for start, end in pairs}
     best, direction = 0.0, None
     for (start, end), left in sides.items():
@@ -248,7 +245,7 @@ def describe_house(town: Town, number: int, areas: dict[str, float], use: Any) -
     building = town.read(number)
     figures = roof_figures(building.solid)
     z_ground = find_ground_height(building, figures)
-    heights = storey_heights(is_residential(use))
+    heights = RESIDENTIAL_STOREY_M if is_residential(use) else OTHER_STOREY_M
     eave_m = figures.h_eave - z_ground
     storeys = count_storeys(eave_m, heights)
     floors = measure_floors(building.solid, z_ground, eave_m, heights)

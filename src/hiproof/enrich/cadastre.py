@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Collection, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -73,7 +74,7 @@ def roof_edges(solid: Solid) -> np.ndarray:
         for face in solid.faces
         if face.kind == ROOF
         for ring in face.rings
-        for start, end in zip(ring, (*ring[1:], ring[0]), strict=True)
+        for start, end in pairwise((*ring, ring[0]))
     }
     return solid.vertices[np.array(sorted(pairs), int).reshape(-1, 2)]
 

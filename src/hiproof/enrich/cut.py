@@ -7,6 +7,7 @@ that edge.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -140,7 +141,7 @@ def insert_corners(face: Face, vertices: np.ndarray, added: range) -> Face:
     for ring in face.rings:
         others = np.array([n for n in added if n not in ring], int)
         corners: list[int] = []
-        for start, end in zip(ring, (*ring[1:], ring[0]), strict=True):
+        for start, end in pairwise((*ring, ring[0])):
             inner = list_between(vertices[start], vertices[end], vertices[others], SAME_CORNER_M)
             corners += [start, *others[inner].tolist()]
         rings.append(tuple(corners))

@@ -23,8 +23,7 @@ from ..stages.outline import largest_polygon, to_local
 from ..stages.remarks import add_remark
 from ..status import Doubt, Status
 from ..write.parameters import outline_record
-from .building import build
-from .override import RANGES, Override, choose_frame, describe_block
+from .override import RANGES, Override, build_over_ground, choose_frame, describe_block
 
 ABOVE_GROUND = "+"  # before a column: its heights count from the ground
 WITHOUT_POINTS = (Status.NO_POINTS, Status.NO_ROOF)
@@ -135,23 +134,7 @@ def build_block(
             return add_remark(building, "its height is known, but not that of its ground")
     top = ground.z + heights.block_m if heights.block_m is not None else heights.roof_m
     rings = outline_record(local)
-    created = build(
-        {
-            "id": building.id,
-            "status": Status.FROM_ATTRIBUTES.code,
-            "origin": frame.origin.tolist(),
-            "outline": rings,
-            "z_ground": ground.z,
-            "ground_source": ground.source,
-            "parts": [describe_block(rings, top - frame.origin[2])],
-        },
-        settings.compose,
-    )
-    return dataclasses.replace(
-        created,
-        detail=Status.FROM_ATTRIBUTES.value,
-        terrain_intersection=ground.intersection,
-        attributes=building.attributes,
-        footprint=building.footprint,
-        shift=building.shift,
+    parts = [describe_block(rings, top - frame.origin[2])]
+    return build_over_ground(
+        building, Status.FROM_ATTRIBUTES, frame, rings, ground, parts, settings
     )

@@ -314,29 +314,43 @@ def build_given(
     parts = override.parts
     if parts is None and override.block_height is not None:
         parts = [describe_block(rings, ground.z + override.block_height - frame.origin[2])]
-    place = {
-        "origin": frame.origin.tolist(),
-        "outline": rings,
-        "z_ground": ground.z,
-        "ground_source": ground.source,
-    }
-    created = build(
-        {"id": building.id, "status": Status.MODELLED.code, **place, "parts": parts},
-        settings.compose,
-    )
-    created = dataclasses.replace(
-        created,
-        detail="as given",
-        terrain_intersection=ground.intersection,
-        attributes=building.attributes,
-        footprint=created.footprint if building.footprint is None else building.footprint,
-        shift=building.shift,
-    )
+    created = build_over_ground(building, Status.MODELLED, frame, rings, ground, parts, settings)
+    created = dataclasses.replace(created, detail="as given")
     created = measure_building(created, local) if len(local) else created
     created = reach_terrain(created, ground, settings)
     created = open_passages(created, ground, given)
     created = add_installations(created, local, settings)
     return add_remark(created, of_footprint)
+
+
+def build_over_ground(
+    building: Building,
+    status: Status,
+    frame: LocalFrame,
+    rings: Any,
+    ground: Ground,
+    parts: Any,
+    settings: Settings,
+) -> Building:
+    """Return the building of `parts` over the outline `rings` and a ground, with a status."""
+    record = {
+        "id": building.id,
+        "status": status.code,
+        "origin": frame.origin.tolist(),
+        "outline": rings,
+        "z_ground": ground.z,
+        "ground_source": ground.source,
+        "parts": parts,
+    }
+    created = build(record, settings.compose)
+    return dataclasses.replace(
+        created,
+        detail=status.value,
+        terrain_intersection=ground.intersection,
+        attributes=building.attributes,
+        footprint=created.footprint if building.footprint is None else building.footprint,
+        shift=building.shift,
+    )
 
 
 def describe_block(rings: Any, z_local: float) -> dict[str, Any]:

@@ -11,46 +11,13 @@ from ..primitives.cants import MEASURES, MOST_CANTS
 from ..primitives.catalogue import CATALOGUE
 from ..read.crs import NAMED_UNITS
 from ..status import Change, ChangeKind, Grade, Status
-from ..write.attribute_list import TABLES
-from ..write.parameters import VERSION
-from .building import BOX_SIZES
+from ..write.attribute_list import DECLARED, TABLES
 
 RECORDS = (
     *("head", "update", "roof_outside", "building", "part", "passage", "installation"),
     *("overhang", "change", "ended_model", "change_place"),
 )
-NUMBER_SCHEMA = {"type": "number"}
-LENGTH_SCHEMA = {"type": "number", "exclusiveMinimum": 0}
-TYPE_SCHEMAS: dict[str, dict[str, Any]] = {
-    "version": {"const": VERSION},
-    "text": {"type": "string"},
-    "number": NUMBER_SCHEMA,
-    "integer": {"type": "integer"},
-    "natural": {"type": "integer", "minimum": 0},
-    "length": LENGTH_SCHEMA,
-    "object": {"type": "object"},
-    "numbers": {"type": "object", "additionalProperties": NUMBER_SCHEMA},
-    "shares": {"type": "object", "additionalProperties": {"type": ["number", "null"]}},
-    "parameters": {
-        "type": "object",
-        "additionalProperties": NUMBER_SCHEMA,
-        "properties": dict.fromkeys(("width", "length"), LENGTH_SCHEMA),
-    },
-    "box": {
-        "type": "object",
-        "properties": dict.fromkeys(BOX_SIZES, LENGTH_SCHEMA),
-        "required": list(BOX_SIZES),
-        "additionalProperties": False,
-    },
-    "pair": {"type": "array", "items": NUMBER_SCHEMA, "minItems": 2, "maxItems": 2},
-    "place": {"type": "array", "items": NUMBER_SCHEMA, "minItems": 3, "maxItems": 3},
-}
-TYPE_SCHEMAS["figures"] = TYPE_SCHEMAS["shares"]
-TYPE_SCHEMAS["polygon"] = {
-    "type": "array",
-    "items": {"type": "array", "minItems": 3, "items": TYPE_SCHEMAS["pair"]},
-    "minItems": 1,
-}
+TYPE_SCHEMAS: dict[str, dict[str, Any]] = DECLARED["schemas"]
 CHOICES: dict[str, Any] = {
     "unit": NAMED_UNITS,
     "status": [status.code for status in Status],

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from importlib import resources
 from types import CodeType
 from typing import Any
 
 import numpy as np
 
+from ..data_files import read_data_file
 from .algebra import SYMBOLS, U, V, formula, q0, q1, q2, q3
 from .contract import (
     HALF_LENGTH,
@@ -36,15 +35,14 @@ LIMITS = {
     "steepest": SLOPE_MAX,
 }
 BASICS: dict[str, Any] = {"__builtins__": {}, "pi": math.pi, "min": min, "max": max, "range": range}
-SHAPES_FILE = resources.files("hiproof") / "data" / "shapes.toml"
-SHAPE_ROWS: dict[str, dict[str, Any]] = tomllib.loads(SHAPES_FILE.read_text(encoding="utf-8"))
+SHAPE_ROWS: dict[str, dict[str, Any]] = read_data_file("shapes")
 for name, row in SHAPE_ROWS.items():
     SHAPE_ROWS[name] = SHAPE_ROWS.get(row.get("like", ""), {}) | row
 
 
 @cache
 def compile_text(text: str) -> CodeType:
-    return compile(f"({text})", SHAPES_FILE.name, "eval")
+    return compile(f"({text})", "shapes.toml", "eval")
 
 
 def evaluate(

@@ -31,6 +31,7 @@ crs           reference systems and their units
 roofn3d       the RoofN3D data set
 remote        files by address
 numbers       numbers in columns that people fill
+names         names, units and codes that files use
 plausible     what no input may say
 
 Everything unreadable raises `errors.InputError` with one sentence; what was put right on the way is

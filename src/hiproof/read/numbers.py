@@ -15,12 +15,10 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from ..errors import InputWarning
+from .names import READING
 
 # Metres of the units of length that may follow a number.
-METRES_OF = {
-    **dict.fromkeys(("", "m", "metre", "metres", "meter", "meters"), 1.0),
-    **dict.fromkeys(("ft", "foot", "feet", "'"), 0.3048),
-}
+METRES_OF: dict[str, float] = READING["length_units"]
 
 PLAIN_NUMBER = re.compile(
     r"([+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:e[+-]?\d+)?)\s*([a-z']*)", re.IGNORECASE

@@ -23,7 +23,7 @@ from .relief import Relief
 from .roofs import SimBuilding, turn_points
 from .scanner import ScanSettings
 from .survey import Bounds, Flight, divide_into_patches, survey, write_footprints, write_laz
-from .town import Lot, furnish_lot, street_side
+from .town import TOWN, Lot, furnish_lot, street_side
 
 CITY_ORIGIN_XY = np.array([95000.0, 455000.0])
 GROUND_BORDER_M = 15.0  # m, heights of hills over valleys
@@ -36,35 +36,7 @@ WORKS_SHARE = 0.12  # of the blocks hold works instead of houses, as at a town's
 SURROUNDINGS_M = 30.0  # m beyond a tile in which houses may throw shadows or trees into it
 CACHED_BLOCKS = 400  # blocks kept in memory: a tile and those around it
 
-HOUSES = {
-    "gable": 0.26,
-    "hip": 0.10,
-    "flat": 0.10,
-    "row": 0.10,
-    "half_hip": 0.06,
-    "monopitch": 0.05,
-    "asymmetric_gable": 0.05,
-    "pyramid": 0.04,
-    "mansard": 0.04,
-    "gambrel": 0.04,
-    "extension": 0.06,
-    "L": 0.04,
-    "T": 0.03,
-    "two_level": 0.02,
-    "cross": 0.005,
-    "U": 0.005,
-    "dormered": 0.04,
-    "winged_hip": 0.01,
-    "L_of_hips": 0.02,
-}
-WORKS = {
-    "shed": 0.35,
-    "saw_tooth_hall": 0.15,
-    "flat": 0.2,
-    "two_level": 0.15,
-    "monopitch": 0.1,
-    "U": 0.05,
-}
+HOUSES, WORKS = TOWN["houses"], TOWN["works"]
 
 
 @dataclass(frozen=True)

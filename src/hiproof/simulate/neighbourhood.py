@@ -21,18 +21,12 @@ from .survey import (
     write_laz,
     write_terrain,
 )
-from .town import Lot, furnish_lot, street_side
+from .town import TOWN, Lot, furnish_lot, street_side
 
 DEMO_SEED = 5  # whose neighbourhood has every roof type
 ORIGIN_XY = np.array([92000.0, 451000.0])
 GROUND_M = 4.0  # m, heights of hills over valleys: a gentle slope
-STREETS = (
-    ("gable", "hip", "half_hip", "pyramid", "L", "gambrel"),
-    ("flat", "extension", "mansard", "gable", "asymmetric_gable", "cross"),
-    ("row", "monopitch", "T", "hip", "two_level"),
-    ("shed", "U", "pyramid", "half_hip"),
-    ("saw_tooth_hall", "monopitch", "asymmetric_gable", "mansard", "gambrel"),
-)
+STREETS: list[list[str]] = TOWN["streets"]
 STREET_WIDTH_M = 9.0  # m between the rows of houses
 TERRAIN_BORDER_M = 8.0  # m of ground around the outermost houses, for their terrain
 DEMO_FILES = ("cloud.laz", "footprints.gpkg", "terrain.tif", "truth.json")

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import shapely
 
+from ..data_files import read_data_file
 from ..frames import LocalFrame
 from ..model import Roof
 from .compounds import COMPOUND_KINDS, random_compound
@@ -21,6 +22,7 @@ from .relief import Relief
 from .roofs import SimBuilding, find_largest_part, random_building, turn_building, turn_points
 from .scene import Body, Defects, Scene, building_bodies, make_scene, superstructures, trees
 
+TOWN = read_data_file("towns")
 TOWN_DEFECTS = replace(Defects.none(), tree=0.45, chimney=0.45, dormer=0.2, antenna=0.1)
 
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
-from importlib import resources
 from typing import Any, NamedTuple
 
+from ..data_files import read_data_file
 from ..formats import FORMATS
 from ..primitives.catalogue import CATALOGUE
 from ..primitives.contract import SIDES
@@ -37,9 +36,7 @@ class AttributeTable(NamedTuple):
         return tuple(attribute.name for attribute in self.attributes)
 
 
-DECLARED = tomllib.loads(
-    (resources.files("hiproof") / "data" / "attributes.toml").read_text(encoding="utf-8")
-)
+DECLARED = read_data_file("attributes")
 SIZES, KINDS_OF_TYPES = DECLARED["sizes"], DECLARED["kinds"]
 # Every parameter of a part by name, but for those of cants: unit and meaning.
 SHAPE: dict[str, tuple[str, str]] = {

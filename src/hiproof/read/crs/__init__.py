@@ -14,6 +14,7 @@ from pyproj.exceptions import CRSError, ProjError
 
 from ...errors import InputError, InputWarning
 from ...frames import METRES, Units
+from ..names import READING
 from .axes import check_height_axis, check_plan_axes
 
 WGS84 = CRS.from_epsg(4326)  # what places on the Earth are compared in
@@ -26,16 +27,6 @@ NAMED_UNITS = {
     "us-survey-foot": Units(1200 / 3937, 1200 / 3937, "US survey foot", "US survey foot"),
 }
 
-
-# EPSG codes of names in `urn:adv:crs:PLAN*HEIGHT`, as German surveying authorities write them.
-ADV_NAMES = {
-    **{f"ETRS89_UTM{zone}": 25800 + zone for zone in (31, 32, 33)},
-    **{f"DE_DHDN_3GK{zone}": 31464 + zone for zone in (2, 3, 4, 5)},
-    "DE_DHHN12_NH": 7699,
-    "DE_DHHN85_NH": 5784,
-    "DE_DHHN92_NH": 5783,
-    "DE_DHHN2016_NH": 7837,
-}
 
 # Names by EPSG codes that PROJ does not read: of GML 3.1, of plan and heights, without a version.
 EPSG_NAME = re.compile(
@@ -86,7 +77,7 @@ def translate_name(name: str) -> str:
     if EPSG_NAME.fullmatch(name.strip()):
         return "EPSG:" + "+".join(EPSG_CODE.findall(name))
     parts = name.strip().removeprefix("urn:adv:crs:").split("*")
-    codes = [ADV_NAMES.get(part) for part in parts]
+    codes = [READING["adv_crs"].get(part) for part in parts]
     return name if None in codes else "EPSG:" + "+".join(map(str, codes))
 
 

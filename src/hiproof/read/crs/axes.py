@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from ...errors import InputError
+from ..names import READING
 
 # Shortest and longest unit (m) of a coordinate: EPSG's own linear units run from 0.001 m to 1,852
 # m.
@@ -19,27 +20,7 @@ LEAST_UNIT_M, MOST_UNIT_M = 1e-3, 2000.0
 ANGULAR_UNITS = ("degree", "radian", "grad", "gon", "arc-second", "arc-minute")
 
 # Directions of axes clockwise from north, a sixteenth of a turn apart.
-COMPASS = (
-    *(
-        "north",
-        "northNorthEast",
-        "northEast",
-        "eastNorthEast",
-        "east",
-        "eastSouthEast",
-        "southEast",
-    ),
-    *(
-        "southSouthEast",
-        "south",
-        "southSouthWest",
-        "southWest",
-        "westSouthWest",
-        "west",
-        "westNorthWest",
-    ),
-    *("northWest", "northNorthWest"),
-)
+COMPASS: list[str] = READING["compass"]
 
 
 def check_plan_axes(plan: Any, source: str) -> None:

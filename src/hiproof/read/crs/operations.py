@@ -117,7 +117,9 @@ def operation_at(source: str, target: str, place: tuple[float, float]) -> Operat
         in_use = transformer
     accuracy = in_use.accuracy if in_use.accuracy is not None and in_use.accuracy >= 0 else None
     better = [
-        way for way in missing_ways(source, target, place) if is_better(way.accuracy, accuracy)
+        way
+        for way in missing_ways(source, target, place)
+        if accuracy is None or 0 <= way.accuracy < accuracy  # a negative one is unknown
     ]
     operation = Operation("", source, target, place, in_use.description, accuracy)
     if not better:
@@ -137,8 +139,3 @@ def missing_ways(source: str, target: str, place: tuple[float, float]) -> list:
         return TransformerGroup(
             source, target, always_xy=True, area_of_interest=area
         ).unavailable_operations
-
-
-def is_better(accuracy: float, than: float | None) -> bool:
-    """Return whether an accuracy (m) is finer than another; None and negatives are unknown."""
-    return than is None or 0 <= accuracy < than

@@ -150,8 +150,9 @@ def features(
     transform, units = None, crs_units or alternative
     first_name, seen_head = None, False
     for document, place in documents(path, damaged):
+        nothing = Feature({}, np.empty((0, 3)), place, units, True)
         if not document:
-            yield Feature({}, np.empty((0, 3)), place, units, True)
+            yield nothing
             continue
         name = reference_system(document)
         if seen_head:
@@ -171,7 +172,7 @@ def features(
                 "it there"
             )
             (refuse if document["type"] == "CityJSON" else damaged)(damage)
-            yield Feature({}, np.empty((0, 3)), place, units, True)
+            yield nothing
 
 
 def read_transform(document: dict[str, Any]) -> tuple[np.ndarray, np.ndarray] | None:

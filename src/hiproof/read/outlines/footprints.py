@@ -30,6 +30,7 @@ from ..crs import (
 )
 from ..crs.operations import find_operation, warn_if_coarse
 from ..crs.positions import format_box, refuse_degrees
+from ..names import READING
 from ..remote import is_url
 from .database import is_database, read_table, table_crs
 from .geoparquet import is_parquet
@@ -44,20 +45,7 @@ UNDEFINED_CRS = ("Undefined Cartesian SRS", "Undefined geographic SRS", "Undefin
 SAME_M = 0.01  # m, within which two outlines are the same: footprints are drawn in centimetres
 
 Box = tuple[float, float, float, float]
-ID_NAMES = (
-    *(
-        "id",
-        "building_id",
-        "identificatie",
-        "identificatiebagpnd",
-        "gml_id",
-        "gmlid",
-        "fid",
-        "osm_id",
-        "egid",
-    ),
-    *("objectid", "globalid", "uuid", "cleabs", "lokaalid"),
-)
+ID_NAMES: list[str] = READING["id_names"]
 
 
 def read_footprints(

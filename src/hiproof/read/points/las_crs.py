@@ -11,6 +11,7 @@ from pyproj import CRS
 from pyproj.exceptions import CRSError
 
 from ..crs import UnknownCRS, combine, explain_crs_error, names_heights_alone, vertical_crs
+from ..names import READING
 
 # Records that hold the keys: the directory, and where it points to for decimals and for texts.
 DIRECTORY, DOUBLES, TEXTS = 34735, 34736, 34737
@@ -31,9 +32,6 @@ UNDEFINED, USER_DEFINED = 0, 32767
 EPSG_CODES = range(1024, USER_DEFINED)  # codes that are EPSG's
 
 PROJECTED, GEOGRAPHIC, GEOCENTRIC = 1, 2, 3  # values of the key MODEL
-
-# EPSG's code by GeoTIFF 1.0's own code of a height system (section 6.3.4.1 there).
-GEOTIFF_HEIGHTS = {5101: 5701, 5102: 5702, 5103: 5703, 5104: 5736, 5105: 5705, 5106: 5611}
 
 ELLIPSOIDAL = range(5001, 5034)  # geoTIFF 1.0's codes of heights above an ellipsoid
 
@@ -145,8 +143,8 @@ def decode_crs(directory: bytes, doubles: bytes = b"", texts: bytes = b"") -> CR
 
 def decode_vertical_crs(code: int) -> CRS:
     """Return a vertical CRS by EPSG's code or by one of GeoTIFF 1.0's own."""
-    if code in GEOTIFF_HEIGHTS:
-        return CRS.from_epsg(GEOTIFF_HEIGHTS[code])
+    if epsg := READING["geotiff_heights"].get(str(code)):
+        return CRS.from_epsg(epsg)
     if code in ELLIPSOIDAL:
         return heights_in("ellipsoidal height", "metre", 1.0)
     named_crs = CRS.from_epsg(code)

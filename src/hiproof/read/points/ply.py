@@ -12,15 +12,12 @@ import numpy as np
 
 from ...errors import InputError
 from ...log import count_things
+from ..names import READING
 from ..remote import open_binary
 from .las import Chunk
 from .text import TextLayout, find_columns, parse_rows, read_classes
 
-PLY_TYPES = {
-    **{"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4"},
-    **{"int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4"},
-    **{"float": "f4", "double": "f8", "float32": "f4", "float64": "f8"},
-}
+PLY_TYPES: dict[str, str] = READING["ply_types"]
 PLAIN_COUNT = re.compile("[0-9]{1,18}")
 BYTE_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 

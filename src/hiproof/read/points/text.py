@@ -13,6 +13,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...log import count_things
+from ..names import READING
 from ..remote import open_binary
 from .las import Chunk
 
@@ -138,12 +139,7 @@ def is_number(text: str) -> bool:
     return True
 
 
-NAMES = {
-    "x": ("x", "east", "easting", "x_coord", "point_x"),
-    "y": ("y", "north", "northing", "y_coord", "point_y"),
-    "z": ("z", "height", "elevation", "z_coord", "point_z"),
-    "classification": ("classification", "class", "scalar_classification"),
-}
+NAMES: dict[str, list[str]] = READING["point_columns"]
 
 
 def find_columns(header: Sequence[str]) -> tuple[int, ...] | None:

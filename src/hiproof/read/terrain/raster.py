@@ -31,6 +31,7 @@ from ..crs import (
     same_horizontal,
     vertical_crs,
 )
+from ..names import READING
 from ..plausible import HIGHEST_LAND_M, LOWEST_LAND_M
 from .raster_checks import alpha_band, band_unit, height_band, read_scaling, refuse_without_position
 
@@ -43,23 +44,7 @@ TILES_KEPT = 8  # Tiles kept in memory (8 MB). Buildings come in order of place.
 MOST_TILES_CHECKED = 4000
 
 # Stored values that programs write for "no data", whatever their scale and unit.
-NODATA_CODES = (
-    0.0,
-    -1.0,
-    -9.0,
-    -99.0,
-    99.0,
-    -100.0,
-    255.0,
-    -999.0,
-    999.0,
-    -9999.0,
-    9999.0,
-    -32767.0,
-    -32768.0,
-    32767.0,
-    65535.0,
-)
+NODATA_CODES: list[float] = READING["nodata_codes"]
 
 # Distance (m) from all other heights that makes one of CODES no height: ground has steps of that
 # size, but no ground between them is rare.

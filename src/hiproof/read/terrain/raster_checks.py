@@ -14,37 +14,13 @@ from collections.abc import Iterator
 from typing import Any
 
 from ...errors import InputError, InputWarning
+from ..names import READING
 
-# Metres in each unit that a band may name, by its spellings without blanks and punctuation.
-UNIT_NAMES = {
-    "m metre meter metres meters": 1.0,
-    "dm decimetre decimeter decimetres decimeters": 0.1,
-    "cm centimetre centimeter centimetres centimeters": 0.01,
-    "mm millimetre millimeter millimetres millimeters": 0.001,
-    "km kilometre kilometer kilometres kilometers": 1000.0,
-    "ft foot feet intft ftint internationalfoot internationalfeet footinternational": 0.3048,
-    "usft ftus ussurveyfoot ussurveyfeet surveyfoot surveyfeet footussurvey footus usfoot "
-    "usfeet": 1200 / 3937,
-    "yd yard yards": 0.9144,
+METRES_IN: dict[str, float] = {
+    name: metres for names, metres in READING["height_units"].items() for name in names.split()
 }
-
-METRES_IN = {name: metres for names, metres in UNIT_NAMES.items() for name in names.split()}
-NO_UNIT = ("", "unknown", "unnamed", "none", "na")
 # "m above sea level", "m+NAP"
 DATUM = re.compile(r"\b(above|over|nap|nn|nhn|navd\w*|egm\w*|msl|asl|a\.s\.l)\b.*|\+.*")
-PICTURE = (
-    "red",
-    "green",
-    "blue",
-    "palette",
-    "hue",
-    "saturation",
-    "lightness",
-    "cyan",
-    "magenta",
-    "yellow",
-    "black",
-)
 
 
 def refuse_without_position(dataset: Any, path: str) -> None:
@@ -81,7 +57,9 @@ def height_band(dataset: Any, path: str) -> int:
     kinds = [interpretation.name.lower() for interpretation in dataset.colorinterp]
     bands = [number for number, kind in enumerate(kinds, 1) if kind != "alpha"]
     band = bands[0] if bands else 1
-    if kinds[band - 1] in PICTURE or str(dataset.dtypes[band - 1]).startswith("complex"):
+    if kinds[band - 1] in READING["picture_bands"] or str(dataset.dtypes[band - 1]).startswith(
+        "complex"
+    ):
         text = (
             "complex numbers"
             if "complex" in str(dataset.dtypes[band - 1])
@@ -126,7 +104,7 @@ def band_unit(name: str | None, path: str) -> float | None:
     for plain in spellings(name or ""):
         if plain in METRES_IN:
             return METRES_IN[plain]
-        if plain in NO_UNIT:
+        if plain in READING["no_unit"]:
             return None
     raise InputError(
         f"expected heights in metres or feet at {path}, got a band in {name!r}; convert them to "

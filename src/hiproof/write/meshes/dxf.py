@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from io import TextIOWrapper
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -84,9 +85,7 @@ def draw_building(space: Any, model: ViewedModel, unit_m: float) -> None:
     for face, triangles in zip(
         solid.faces, faces_triangles(solid.vertices, solid.faces), strict=True
     ):
-        pairs = {
-            pair for ring in face.rings for pair in zip(ring, (*ring[1:], ring[0]), strict=True)
-        }
+        pairs = {pair for ring in face.rings for pair in pairwise((*ring, ring[0]))}
         edges = pairs | {(b, a) for a, b in pairs}
         for a, b, c in triangles.tolist():
             sides = zip(INVISIBLE_EDGES, ((a, b), (b, c), (c, a)), strict=True)
