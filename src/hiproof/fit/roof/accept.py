@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...compiled import compiled
-from .draw import is_near
+from .draw import is_near, widen_box
 from .moves import MOVE_COLUMNS, SHARE, TO_POINTS, apply_move, list_moves
 from .price import (
     count_known_units,
@@ -35,8 +35,6 @@ HOPE_UNITS = 2.0  # What fitting may still save of a move that does not pay befo
 LOOP_ROUNDS = 30  # Most rounds of the loop.
 MOST_MOVES = 20_000  # Most moves in a round.
 FIRST_JUDGES = 400  # Most points of a box that judge a move first. Of more, every k-th does.
-# What they say errs by so much (units): more than what a move saves that changes little.
-SMALL_UNITS = 1.5
 
 
 @compiled
@@ -57,17 +55,11 @@ def measure_change(roof, trial, changed, site, box):
 
 
 @compiled
-def widen_box(box, other):
-    box[0], box[1] = min(box[0], other[0]), max(box[1], other[1])
-    box[2], box[3] = min(box[2], other[2]), max(box[3], other[3])
-
-
-@compiled
 def try_move(roof, trial, move, site, drawing, known, changed, box, exact):
     """Apply a move to a copy of the roof, fit it, and return what it saves (points).
 
     `trial`, `changed` and `box` are set. A move that is not possible saves nothing. Unless it is to
-    be `exact`, a sample of the points judges, and then all of them if they may say otherwise.
+    be `exact`, a sample of the points judges, but not what saves as little as the sample errs.
     """
     copy_tables(roof, trial)
     if not has_room(trial) or not apply_move(trial, move, site, changed):
@@ -76,18 +68,11 @@ def try_move(roof, trial, move, site, drawing, known, changed, box, exact):
     view, points = list_view(trial, box), list_points(site, box)
     if len(view) == 0:
         return 0.0
-    units = count_known_units(known, box)
-    if len(points) > FIRST_JUDGES and not exact:
-        sample = points[:: 1 + (len(points) - 1) // FIRST_JUDGES].copy()
-        values, weight = trial.values.copy(), len(points) / len(sample)
-        gain = judge(trial, site, drawing, view, box, sample, weight, known.costs, units)
-        is_small = move[0] == SHARE or move[0] == TO_POINTS
-        if not is_small or abs(gain) >= SMALL_UNITS * site.unit:
-            return gain
-        trial.values[:] = values
-        for m in range(len(view)):
-            place_planes(trial, view[m])
-    return judge(trial, site, drawing, view, box, points, 1.0, known.costs, units)
+    units, weight = count_known_units(known, box), 1.0
+    if len(points) > FIRST_JUDGES and not exact and move[0] != SHARE and move[0] != TO_POINTS:
+        step = 1 + (len(points) - 1) // FIRST_JUDGES
+        weight, points = len(points) / len(points[::step]), points[::step].copy()
+    return judge(trial, site, drawing, view, box, points, weight, known.costs, units)
 
 
 @compiled

@@ -125,6 +125,12 @@ def is_near(box, other, reach):
 
 
 @compiled
+def widen_box(box, other):
+    box[0], box[1] = min(box[0], other[0]), max(box[1], other[1])
+    box[2], box[3] = min(box[2], other[2]), max(box[3], other[3])
+
+
+@compiled
 def number_planes(roof, view, numbers):
     """Give equal planes of the volumes in `view` one number."""
     for m in range(len(view)):

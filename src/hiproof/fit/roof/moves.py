@@ -10,7 +10,7 @@ import numpy as np
 
 from ...compiled import compiled
 from ..prices import LEAN_UNITS
-from .draw import is_near
+from .draw import is_near, widen_box
 from .ends import find_end
 from .tables import (
     FAR_M,
@@ -32,7 +32,7 @@ from .tables import (
 (
     LEAVE_OUT,  # volume a
     LEAVE_PLANE,  # plane b of volume a
-    SHARE,  # unknown b becomes a, which keeps its value if c
+    SHARE,  # unknown b becomes a, which keeps its value: points all around it hold it
     TO_OUTLINE,  # side b of volume a on line c of the outline
     TO_LINE,  # side b of volume a on line c of the roof
     RUN_ON,  # side b of volume a, by step c
@@ -65,9 +65,6 @@ BESIDE_WALL_M = 0.3  # Distance (m) from the middle of a wall of a line that is 
 COVER_M = 0.3  # Least distance (m) of a side from the wall to which its volume is drawn out.
 MOST_LINES = 7  # Most lines to which a side is moved.
 RUN_ON_STEPS_M = (0.6, 1.5, 3.0)  # Distances (m) by which a side is run on.
-MOST_SHARED_M = (
-    40.0  # A part of a roof so wide (m) is priced whole. What lies beyond keeps its value.
-)
 SAME_FAR = 0.03  # The same of volumes that are not near each other.
 MOST_ALIKE = 2  # Most unknowns, the next higher ones, that each may be one with.
 ALIKE_SLOPES, ALIKE_HEIGHTS_M = 0.2, 0.7  # Unknowns (rise over run, m) nearer than this may be one.
@@ -136,7 +133,7 @@ def list_merges(roof, site, j, k, moves, count):
     along = abs(first[0] * second[0] + first[1] * second[1])
     across = abs(first[0] * third[0] + first[1] * third[1])
     if max(along, across) >= SAME_DIRECTION:
-        for way in range(FACE_SECOND + 1):
+        for way in range(FACE_SIDES + 1):
             if not site.keeps_shapes or has_alike(roof, j, k):
                 count = write_move(moves, count, MERGE, j, k, way, 1)
                 count = write_move(moves, count, MERGE, k, j, way, 1)
@@ -173,18 +170,16 @@ def list_equal_planes(roof, site, j, k, moves, count):
 def list_shares(roof, site, asked, moves, count):
     """Write the pairs of unknowns next to each other in value that are nearly alike."""
     n = roof.counts[UNKNOWN_COUNT]
-    kinds, boxes, is_asked = np.zeros(n, np.int64), np.zeros((n, 4)), np.zeros(n, np.bool_)
+    kinds, is_asked = np.zeros(n, np.int64), np.zeros(n, np.bool_)
+    boxes = np.full((n, 4), np.inf)
+    boxes[:, 1::2] = -np.inf
     for k in range(roof.counts[VOLUME_COUNT]):
         for p in range(roof.n_planes[k]):
             for kind in range(1, 3):
                 u = roof.heights[k, p] if kind == 1 else roof.slopes[k, p]
                 if u < 0:
                     continue
-                box, other = boxes[u], roof.boxes[k]
-                if kinds[u] == 0:
-                    box[:] = other
-                box[0], box[1] = min(box[0], other[0]), max(box[1], other[1])
-                box[2], box[3] = min(box[2], other[2]), max(box[3], other[3])
+                widen_box(boxes[u], roof.boxes[k])
                 kinds[u] = kind
                 is_asked[u] |= asked[k]
     order = np.argsort(roof.values[:n])
@@ -197,24 +192,14 @@ def list_shares(roof, site, asked, moves, count):
                 break
             if kinds[a] == 0 or kinds[a] != kinds[b] or not (is_asked[a] or is_asked[b]):
                 continue
-            box = boxes[b]
-            is_close = is_near(boxes[a], box, NEIGHBOUR_M)
             alike = ALIKE_HEIGHTS_M if kinds[a] == 1 else ALIKE_SLOPES
-            wide = min(max(boxes[a, 1], box[1]), site.bounds[1]) - max(
-                min(boxes[a, 0], box[0]), site.bounds[0]
-            )
-            deep = min(max(boxes[a, 3], box[3]), site.bounds[3]) - max(
-                min(boxes[a, 2], box[2]), site.bounds[2]
-            )
-            if gap >= (alike if is_close else SAME_FAR):
+            if gap >= (alike if is_near(boxes[a], boxes[b], NEIGHBOUR_M) else SAME_FAR):
                 continue
             found += 1
-            if max(wide, deep) < MOST_SHARED_M:
-                count = write_move(moves, count, SHARE, a, b, 0, 0)
-            elif measure_box_area(boxes[a]) > measure_box_area(box):
-                count = write_move(moves, count, SHARE, a, b, 1, 0)
-            else:
-                count = write_move(moves, count, SHARE, b, a, 1, 0)
+            is_first = measure_box_area(boxes[a]) > measure_box_area(boxes[b])
+            count = write_move(
+                moves, count, SHARE, a if is_first else b, b if is_first else a, 0, 0
+            )
     return count
 
 
@@ -356,7 +341,7 @@ def apply_move(roof, move, site, changed):
     kind, a, b, c, d = move[0], move[1], move[2], move[3], move[4]
     changed[:] = False
     if kind == SHARE:
-        return share(roof, a, b, c, changed)
+        return share(roof, a, b, changed)
     if kind == ADD_BAY:
         k = add_bay(roof, site, a)
         changed[k] = True
@@ -504,30 +489,21 @@ def add_bay(roof, site, bay):
 
 
 @compiled
-def share(roof, a, b, keeps, changed):
-    """Let unknown `a` stand for `b`, too. It `keeps` its value, or takes the mean of both."""
-    n_a, n_b = 0, 0
+def share(roof, a, b, changed):
+    """Let unknown `a`, which keeps its value, stand for `b`, too. Returns whether both are used."""
+    is_used = False
     for k in range(roof.counts[VOLUME_COUNT]):
         for p in range(roof.n_planes[k]):
-            if roof.heights[k, p] == a or roof.slopes[k, p] == a:
-                n_a += 1
-                changed[k] |= not keeps
+            is_used |= roof.heights[k, p] == a or roof.slopes[k, p] == a
             if roof.heights[k, p] == b:
                 roof.heights[k, p] = a
-                n_b += 1
                 changed[k] = True
             if roof.slopes[k, p] == b:
                 roof.slopes[k, p] = a
-                n_b += 1
                 changed[k] = True
-    if n_a == 0 or n_b == 0:
-        return False
-    if not keeps:
-        roof.values[a] = (n_a * roof.values[a] + n_b * roof.values[b]) / (n_a + n_b)
-    for k in range(roof.counts[VOLUME_COUNT]):
         if changed[k]:
             place_volume(roof, k)
-    return True
+    return is_used and changed.any()
 
 
 @compiled

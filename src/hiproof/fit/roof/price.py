@@ -34,7 +34,7 @@ Site = namedtuple(
 )
 """What the roof of a building has to explain.
 
-- x, y, z, weight, shade (n + g,): points, ascending by x, then unobserved cells.
+- x, y, z, weight, shade (n + g,): points, then unobserved cells, each ascending by x.
 - n: the number of points. low, high: the heights that a roof may have over cells.
 - dead, width: a point costs min((max(|dz| - dead, 0) / width)^2, 1).
 - unit: the points that a unit of structure must explain.
@@ -67,17 +67,14 @@ def list_view(roof, box):
 @compiled
 def list_points(site, box):
     """Return the numbers of the points and cells in a box."""
-    first = np.searchsorted(site.x[: site.n], box[0])
-    last = np.searchsorted(site.x[: site.n], box[1])
-    out, count = np.empty(last - first + len(site.x) - site.n, np.int64), 0
-    x, y, x0, x1, y0, y1 = site.x, site.y, box[0], box[1], box[2], box[3]
-    for i in range(first, last):  # a number that does not count is overwritten by the next
-        out[count] = i
-        count += (y[i] > y0) & (y[i] < y1)
-    for i in range(site.n, len(x)):
-        if x0 < x[i] < x1 and y0 < y[i] < y1:
+    first, last = np.searchsorted(site.x[: site.n], box[:2])
+    first_cell, last_cell = site.n + np.searchsorted(site.x[site.n :], box[:2])
+    out, count = np.empty(last - first + last_cell - first_cell, np.int64), 0
+    y, y0, y1 = site.y, box[2], box[3]
+    for start, end in ((first, last), (first_cell, last_cell)):
+        for i in range(start, end):  # a number that does not count is overwritten by the next
             out[count] = i
-            count += 1
+            count += (y[i] > y0) & (y[i] < y1)
     return out[:count]
 
 

@@ -32,7 +32,7 @@ def make_site(
     bays, heights, in_bay = list_bays(outline, np.hstack([points, border]).T)
     points = np.hstack([points, border[:, in_bay[scene.n :]]])
     points = points[:, np.argsort(points[0], kind="stable")]
-    n, cells = points.shape[1], slice(scene.n, None)
+    n, cells = points.shape[1], scene.n + np.argsort(scene.U[0, scene.n :], kind="stable")
     x = np.concatenate([points[0], scene.U[0, cells]])
     y = np.concatenate([points[1], scene.V[0, cells]])
     z = np.concatenate([points[2], scene.z[cells]])
