@@ -124,8 +124,8 @@ def test_cells_do_not_depend_on_how_points_are_cut(tmp_path):
         halves.add(PointCloud(points[half], classes[half]))
     whole.save(tmp_path / "whole" / "0.npz")
     halves.save(tmp_path / "halves" / "0.npz")
-    box = shapely.box(0, 0, 9, 9)
-    surveys = [load_survey(tmp_path / name, box) for name in ("whole", "halves")]
+    corners = np.zeros(2), np.full(2, 9.0)
+    surveys = [load_survey(tmp_path / name, *corners) for name in ("whole", "halves")]
     for kind in ("roof", "ground"):
         cells = [survey[kind] for survey in surveys]
         assert len(cells[0]) > 70
@@ -140,8 +140,8 @@ def test_without_a_building_class_level_places_high_above_ground_are_roofs(tmp_p
     cells = SurveyCells(ReadSettings(roofs="shape"))
     cells.add(PointCloud(town.xyz, classes))
     cells.save(tmp_path / "0.npz")
-    everywhere = shapely.box(*(ORIGIN[:2] - 10), *(ORIGIN[:2] + 200))
-    xy = load_survey(tmp_path, everywhere)["roof"][:, :2] - ORIGIN[:2]
+    cells = load_survey(tmp_path, ORIGIN[:2] - 10, ORIGIN[:2] + 200)
+    xy = cells["roof"][:, :2] - ORIGIN[:2]
     built, tree = (
         shapely.intersects_xy(shapely.box(*corners), *xy.T).sum() for corners in (BUILT, TREE)
     )

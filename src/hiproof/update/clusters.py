@@ -79,11 +79,11 @@ def find_clusters(comparison: CellComparison, stray: float = CELL_CHANCE) -> lis
     c = comparison
     is_other = flag_cells(c)
     cells = int(c.is_compared.sum())
-    result = []
+    keys, result = c.cells.astype(np.int64) @ KEY_OF_CELL, []
     for sign in (1.0, -1.0):
         is_chosen = is_other & (sign * c.difference > 0)
         linked = np.flatnonzero(is_chosen | ~c.is_compared)
-        labels = label_components(len(linked), link_neighbours(c.cells[linked]))
+        labels = label_components(len(linked), link_neighbours(keys[linked]))
         for label in np.unique(labels[is_chosen[linked]]):
             members = linked[labels == label]
             result.append(describe_cluster(c, members[is_chosen[members]], cells, stray))
@@ -125,9 +125,8 @@ def is_known_around(comparison: CellComparison, members: np.ndarray) -> np.ndarr
     return result
 
 
-def link_neighbours(cells: np.ndarray) -> np.ndarray:
-    """Return the pairs (2, p) of `cells` (k, 2) that share a side."""
-    keys = cells.astype(np.int64) @ KEY_OF_CELL
+def link_neighbours(keys: np.ndarray) -> np.ndarray:
+    """Return the pairs (2, p) of cells that share a side, by their numbers `keys` (k,)."""
     pairs = [np.intersect1d(keys + side, keys, return_indices=True)[1:] for side in KEY_OF_CELL]
     return np.hstack(pairs)
 

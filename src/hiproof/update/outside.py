@@ -8,8 +8,7 @@ misfits lie there. In clouds without building classes, level cells high above th
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +22,7 @@ from ..geometry.grid import KEY_OF_CELL, number_cells
 from ..model import PointCloud
 from ..settings import ReadSettings
 from ..status import ChangeKind
-from ..write.files import atomic, atomic_file
+from ..write.files import atomic_file, save_text
 from ..write.parameters import outline_record
 from .clusters import ROUGH_M, is_strip, link_neighbours, measure_roughness
 from .plan import EARLIER_FOLDER
@@ -56,11 +55,14 @@ loaded: roofs that are longer are cut."""
 
 ROUNDING_M = 1e-6  # far above the errors of a mean, far below the millimetres of coordinates
 
-AROUND = np.array([(u, v) for u in (-1, 0, 1) for v in (-1, 0, 1)])
+AROUND_KEYS = np.array([(u, v) for u in (-1, 0, 1) for v in (-1, 0, 1)]) @ KEY_OF_CELL
 
 
 class SurveyCells:
-    """The roof and the ground of a survey in cells of a metre."""
+    """The roof and the ground of a survey in cells of a metre.
+
+    A cell (5,) has the mean x, y and z of its points, that of the squares of z, and their number.
+    """
 
     def __init__(self, read: ReadSettings):
         roofs = tuple(set(range(256)) - set(read.ground_classes) - set(NOISE_AND_WATER))
@@ -69,7 +71,7 @@ class SurveyCells:
             "ground": read.ground_classes,
         }
         self.has_classes = read.by_class
-        self.found: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {"roof": [], "ground": []}
+        self.found: dict[str, list[np.ndarray]] = {"roof": [], "ground": []}
 
     def add(self, cloud: PointCloud) -> None:
         """Take the points of a chunk."""
@@ -78,21 +80,17 @@ class SurveyCells:
             is_kind[list(classes)] = True
             points = cloud.xyz.compress(is_kind[cloud.classes], axis=0)
             if len(points):
-                squared = np.column_stack([points, points[:, 2] ** 2])
-                self.found[kind].append(average_cells(squared))
+                rows = np.column_stack([points, points[:, 2] ** 2, np.ones(len(points))])
+                self.found[kind].append(average_cells(rows))
 
     def save(self, path: Path) -> None:
-        """Write the cells of a file."""
+        """Write the cells of a file, with the corners (2, 2) of their box."""
         path.parent.mkdir(parents=True, exist_ok=True)
-        arrays: dict[str, Any] = {"has_classes": self.has_classes}
-        for kind, chunks in self.found.items():
-            means, counts = join_cells(chunks)
-            arrays |= {kind: means, f"{kind}_count": counts}
-        x, y = np.concatenate([arrays["roof"], arrays["ground"]])[:, :2].T
-        if len(x):
-            arrays["bounds"] = [x.min(), y.min(), x.max(), y.max()]
+        arrays = {kind: join_cells(chunks) for kind, chunks in self.found.items()}
+        xy = np.concatenate(list(arrays.values()))[:, :2]
+        box = [xy.min(axis=0, initial=np.inf), xy.max(axis=0, initial=-np.inf)]
         with atomic_file(path) as file:
-            np.savez(file, **arrays)
+            np.savez(file, **arrays, box=np.array(box), has_classes=np.array(self.has_classes))
 
 
 def sort_survey(folder: str, number: int, address: str, epoch: str = "") -> dict:
@@ -106,144 +104,102 @@ def sort_survey(folder: str, number: int, address: str, epoch: str = "") -> dict
     return result
 
 
-def average_cells(
-    points: np.ndarray, counts: np.ndarray | None = None
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the mean (k, 4) and the number of points (k,) of each cell.
-
-    `points` (n, 4), x y z and the square of z, stand for so many points, `counts` (n,), each; None
-    is for one.
-    """
-    offset, number = points.min(axis=0), number_cells(find_cells(points))[1]
+def average_cells(rows: np.ndarray) -> np.ndarray:
+    """Return one row a cell of rows (n, 5) as in SurveyCells, each for so many points."""
+    values, counts = rows[:, :4], rows[:, 4]
+    offset, number = values.min(axis=0), number_cells(find_cells(values))[1]
     total = np.bincount(number, weights=counts)
-    columns = (values - low for values, low in zip(points.T, offset, strict=True))
-    weights = columns if counts is None else (counts * values for values in columns)
-    sums = [np.bincount(number, weights=values) for values in weights]
-    return np.column_stack(sums) / total[:, None] + offset, total.astype(float)
+    sums = [np.bincount(number, weights=counts * column) for column in (values - offset).T]
+    return np.column_stack([np.column_stack(sums) / total[:, None] + offset, total])
 
 
 def find_cells(points: np.ndarray) -> np.ndarray:
-    """Return the cell (k, 2) of each of the points (k, 2 or 3).
+    """Return the cell (k, 2) of each of the points (k, 2 or more).
 
     A mean of points on the lower side of a cell stays in it.
     """
     return np.floor(points[:, :2] + ROUNDING_M).astype(np.int64)
 
 
-def join_cells(chunks: Sequence[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
+def find_keys(points: np.ndarray) -> np.ndarray:
+    """Return the cell (k,) of each of the points (k, 2 or more) as one number."""
+    return np.asarray(find_cells(points) @ KEY_OF_CELL)
+
+
+def join_cells(chunks: list[np.ndarray]) -> np.ndarray:
     """Join the cells of several chunks."""
-    if not chunks:
-        return np.zeros((0, 4)), np.zeros(0)
     if len(chunks) == 1:
         return chunks[0]
-    return average_cells(*(np.concatenate(arrays) for arrays in zip(*chunks, strict=True)))
+    return average_cells(np.concatenate(chunks)) if chunks else np.zeros((0, 5))
 
 
-def load_survey(folder: Path, box: shapely.Polygon) -> dict[str, np.ndarray]:
-    """Load the roof and ground cells (k, 3) of a survey in a box, as mean points."""
-    chunks: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {"roof": [], "ground": []}
-    has_classes, (west, south, east, north) = True, box.bounds
-    for path in list_files(folder, box):
+def load_survey(folder: Path, low: np.ndarray, high: np.ndarray) -> dict[str, np.ndarray]:
+    """Load the roof and ground cells (k, 5) of a survey between two corners (2,)."""
+    chunks: dict[str, list[np.ndarray]] = {"roof": [], "ground": []}
+    has_classes = True
+    for path in list_files(folder):
         with np.load(path) as arrays:
+            if (arrays["box"][0] > high).any() or (arrays["box"][1] < low).any():
+                continue
             has_classes &= bool(arrays["has_classes"])
             for kind, found in chunks.items():
-                means, counts = arrays[kind], arrays[f"{kind}_count"]
-                x, y = means[:, :2].T
-                inside = (x >= west) & (x <= east) & (y >= south) & (y <= north)
+                cells = arrays[kind]
+                inside = ((cells[:, :2] >= low) & (cells[:, :2] <= high)).all(axis=1)
                 if inside.any():
-                    found.append((means[inside], counts[inside]))
-    roof, ground = (join_cells(found)[0] for found in chunks.values())
+                    found.append(cells[inside])
+    result = {kind: join_cells(found) for kind, found in chunks.items()}
     if not has_classes:
-        roof = roof[is_level_and_high(roof, ground)]
-    return {"roof": roof[:, :3], "ground": ground[:, :3]}
+        result["roof"] = result["roof"][is_level_and_high(**result)]
+    return result
 
 
-def list_files(folder: Path, box: shapely.Polygon | None = None) -> list[Path]:
-    """Return the files of a survey's cells, those that meet a box."""
-    paths = sorted(folder.glob("[0-9]*.npz"))
-    return [path for path in paths if box is None or shapely.intersects(read_box(path), box)]
+def list_files(folder: Path) -> list[Path]:
+    return sorted(folder.glob("[0-9]*.npz"))
 
 
-def read_box(path: Path) -> shapely.Polygon:
-    """Return the box around the cells of a file, which may be empty."""
-    with np.load(path) as arrays:
-        return shapely.box(*arrays["bounds"]) if "bounds" in arrays else shapely.Polygon()
-
-
-def is_level_and_high(cells: np.ndarray, ground: np.ndarray) -> np.ndarray:
-    """Return whether (k,) cells (k, 4) are level and high above the ground (m, 4)."""
+def is_level_and_high(roof: np.ndarray, ground: np.ndarray) -> np.ndarray:
+    """Return whether (k,) cells (k, 5) are level and high above the ground (m, 5)."""
     if not len(ground):
-        return np.zeros(len(cells), bool)
+        return np.zeros(len(roof), bool)
     from scipy.spatial import KDTree  # only where classes mark no roofs
 
-    scatter = np.sqrt(np.maximum(cells[:, 3] - cells[:, 2] ** 2, 0.0))
-    nearest = KDTree(ground[:, :2]).query(cells[:, :2])[1]
-    return (scatter < LEVEL_M) & (cells[:, 2] - ground[nearest, 2] > HIGH_OVER_GROUND_M)
-
-
-@dataclass(frozen=True)
-class RoofOutside:
-    """A roof outside all outlines; `id` is the building that it extends, if any.
-
-    `height_m` is that over the ground. `confidence` is the share of its cells that lie bare in the
-    other survey, or for an unmapped roof the share that lie as high there. Both are None where they
-    are unknown.
-    """
-
-    kind: ChangeKind
-    area_m2: float
-    place: shapely.Geometry
-    height_m: float | None
-    confidence: float | None
-    id: str | None = None
-
-    def to_record(self) -> dict[str, Any]:
-        """Return the roof for JSON."""
-        polygons = [outline_record(polygon) for polygon in shapely.get_parts(self.place)]
-        return {
-            "id": self.id,
-            "kind": self.kind.code,
-            "area": self.area_m2,
-            "height": None if self.height_m is None else round(self.height_m, 2),
-            "confidence": None if self.confidence is None else round(self.confidence, 2),
-            "outlines": polygons,
-        }
+    scatter = np.sqrt(np.maximum(roof[:, 3] - roof[:, 2] ** 2, 0.0))
+    nearest = KDTree(ground[:, :2]).query(roof[:, :2])[1]
+    return (scatter < LEVEL_M) & (roof[:, 2] - ground[nearest, 2] > HIGH_OVER_GROUND_M)
 
 
 def save_roofs_outside(state: Path, plan: WorkPlan, has_earlier: bool) -> None:
-    """Find the roofs outside all outlines, and keep them in the folder `state`."""
+    """Find the roofs outside all outlines, and keep them in the folder `state`.
+
+    A roof belongs to the square in which the lower left corner of its place lies.
+    """
     folders = state / CELLS_FOLDER, state / EARLIER_FOLDER / CELLS_FOLDER
     jobs = [job for job in plan.jobs if not job.area.is_empty]
     outlines, names = shapely.STRtree([job.area for job in jobs]), [job.id for job in jobs]
     found = []
     for corner in list_corners([*list_files(folders[0]), *list_files(folders[1])]):
-        box = shapely.box(*(corner - BLOCK_REACH_M), *(corner + BLOCK_M + BLOCK_REACH_M))
-        new, old = (load_survey(folder, box) for folder in folders)
+        low, high = corner - BLOCK_REACH_M, corner + BLOCK_M + BLOCK_REACH_M
+        new, old = (load_survey(folder, low, high) for folder in folders)
         roofs = find_unmapped(new, old["roof"] if has_earlier else None, outlines)
         if has_earlier:
             roofs += find_fresh(new["roof"], old, outlines, names, ChangeKind.BUILT)
             roofs += find_fresh(old["roof"], new, outlines, [], ChangeKind.DEMOLISHED)
-        square = np.array([corner, corner + BLOCK_M])
-        found += [roof for roof in roofs if begins_in(square, roof.place)]
-    with atomic(state / OUTSIDE_FILE) as temporary:
-        records = [roof.to_record() for roof in found]
-        Path(temporary).write_text(json.dumps(records) + "\n", encoding="utf-8")
+        for place, roof in roofs:
+            column, row = np.floor((np.array(place.bounds[:2]) - corner) / BLOCK_M)
+            if column == row == 0:
+                polygons = [outline_record(polygon) for polygon in shapely.get_parts(place)]
+                found.append(roof | {"outlines": polygons})
+    save_text(state / OUTSIDE_FILE, json.dumps(found) + "\n")
 
 
 def list_corners(files: list[Path]) -> list[np.ndarray]:
     """Return the lower left corners (2,) of the squares that hold all cells."""
-    bounds = shapely.total_bounds([read_box(path) for path in files])
-    if not np.isfinite(bounds).all():
+    boxes = np.array([np.load(path)["box"] for path in files]).reshape(-1, 2, 2)
+    low, high = boxes[:, 0].min(axis=0, initial=np.inf), boxes[:, 1].max(axis=0, initial=-np.inf)
+    if not np.isfinite(low).all():
         return []
-    first = np.floor(bounds[:2])
-    columns, rows = np.floor((bounds[2:] - first) / BLOCK_M).astype(int) + 1
-    return [first + BLOCK_M * np.array([i, j]) for i in range(columns) for j in range(rows)]
-
-
-def begins_in(square: np.ndarray, place: shapely.Geometry) -> bool:
-    """Return whether the lower left corner of a place lies in a square (2, 2)."""
-    corner = np.array(place.bounds[:2])
-    return bool((square[0] <= corner).all() and (corner < square[1]).all())
+    columns, rows = np.floor((high - np.floor(low)) / BLOCK_M).astype(int) + 1
+    return [np.floor(low) + BLOCK_M * np.array(place) for place in np.ndindex(columns, rows)]
 
 
 def load_roofs_outside(state: Path) -> list[dict[str, Any]]:
@@ -258,113 +214,111 @@ def find_fresh(
     outlines: shapely.STRtree,
     names: list[str],
     kind: ChangeKind,
-) -> list[RoofOutside]:
+) -> list[tuple[shapely.Geometry, dict[str, Any]]]:
     """Return roofs that stand on what is bare ground in the other survey.
 
-    `roofs` (k, 3) are the cells of one survey, `other` those of the other one. A roof beside a
+    `roofs` (k, 5) are the cells of one survey, `other` those of the other one. A roof beside a
     building extends it where `names` of the buildings are known.
     """
-    points = roofs[~is_among(find_cells(roofs), find_cells(other["roof"]))]
+    known = find_keys(other["roof"])
+    points = roofs[~np.isin(find_keys(roofs), known)]
     points = points[~touches(points, outlines, 0.0)]
-    near = touches(points, outlines, BESIDE_M) | is_beside(points, other["roof"])
-    on_ground = is_among(find_cells(points), find_cells(other["ground"]))
-    result = []
-    for members in group_cells(points, ~near):
-        if on_ground[members].mean() < MOSTLY:
-            continue
-        place = draw_places(points[members])
-        height = measure_height(points[members], other["ground"])
-        found = float(len(members)), place, height, float(on_ground[members].mean())
-        beside = outlines.query(place, predicate="dwithin", distance=BESIDE_M)
-        if len(beside) and names:
-            id = names[int(outlines.query_nearest(place, all_matches=False)[0])]
-            result.append(RoofOutside(ChangeKind.EXTENDED, *found, id))
-        elif not len(beside):
-            result.append(RoofOutside(kind, *found))
-    return result
+    around = find_keys(points)[:, None] + AROUND_KEYS
+    near = touches(points, outlines, BESIDE_M) | np.isin(around, known).any(axis=1)
+    on_ground = np.isin(find_keys(points), find_keys(other["ground"]))
+    found = describe_roofs(points, ~near, on_ground, MOSTLY, other["ground"], outlines, kind)
+    extended = ChangeKind.EXTENDED.code
+    return [
+        (place, roof | {"id": names[beside[0]], "kind": extended} if len(beside) else roof)
+        for place, beside, roof in found
+        if names or not len(beside)
+    ]
 
 
 def find_unmapped(
     survey: dict[str, np.ndarray], other: np.ndarray | None, outlines: shapely.STRtree
-) -> list[RoofOutside]:
+) -> list[tuple[shapely.Geometry, dict[str, Any]]]:
     """Return roofs of a survey away from all outlines, which the roof cells of the other show, too.
 
     Without an `other` survey, all are returned.
     """
-    points = survey["roof"][~touches(survey["roof"], outlines, BESIDE_M)]
-    is_steady = None
+    points, is_steady = survey["roof"], None
+    points = points[~touches(points, outlines, BESIDE_M)]
     if other is not None:
-        keys = [find_cells(cells) @ KEY_OF_CELL for cells in (points, other)]
-        _, here, there = np.intersect1d(*keys, return_indices=True)
+        _, here, there = np.intersect1d(find_keys(points), find_keys(other), return_indices=True)
         points = points[here]
         is_steady = np.abs(points[:, 2] - other[there, 2]) < LEVEL_M
-    result = []
-    for members in group_cells(points, np.ones(len(points), bool)):
-        place, height = (
-            draw_places(points[members]),
-            measure_height(points[members], survey["ground"]),
+    every, ground = np.ones(len(points), bool), survey["ground"]
+    kind = ChangeKind.UNMAPPED
+    found = describe_roofs(points, every, is_steady, 0.0, ground, outlines, kind)
+    return [(place, roof) for place, beside, roof in found if not len(beside)]
+
+
+def describe_roofs(
+    points: np.ndarray,
+    is_core: np.ndarray,
+    is_sure: np.ndarray | None,
+    least: float,
+    ground: np.ndarray,
+    outlines: shapely.STRtree,
+    kind: ChangeKind,
+) -> Iterator[tuple[shapely.Geometry, np.ndarray, dict[str, Any]]]:
+    """Yield each roof among cells (k, 5): its place, the building beside it if any, its record.
+
+    Its confidence is the share of its cells that are sure (k,), `least` of them at least. That is
+    None where they are unknown, as is its height without `ground` (m, 5) near it.
+    """
+    for members in group_cells(points, is_core):
+        share = None if is_sure is None else float(is_sure[members].mean())
+        if share is not None and share < least:
+            continue
+        low = find_cells(points[members])
+        place = shapely.union_all(shapely.box(*low.T, *(low + 1).T))
+        height = measure_height(points[members], ground)
+        record = {
+            "id": None,
+            "kind": kind.code,
+            "area": float(len(members)),
+            "height": height if height is None else round(height, 2),
+            "confidence": share if share is None else round(share, 2),
+        }
+        yield (
+            place,
+            outlines.query_nearest(place, max_distance=BESIDE_M, all_matches=False),
+            record,
         )
-        confidence = None if is_steady is None else float(is_steady[members].mean())
-        if not len(outlines.query(place, predicate="dwithin", distance=BESIDE_M)):
-            roof = RoofOutside(ChangeKind.UNMAPPED, float(len(members)), place, height, confidence)
-            result.append(roof)
-    return result
 
 
 def measure_height(points: np.ndarray, ground: np.ndarray) -> float | None:
     """Return how high (m) a roof lies over the ground around it.
 
-    `points` (k, 3) and `ground` (m, 3) are cells; the result is None where no ground is near.
+    `points` (k, 5) and `ground` (m, 5) are cells; the result is None where no ground is near.
     """
-    low, high = (f(points[:, :2], axis=0) for f in (np.min, np.max))
-    low, high = low - GROUND_AROUND_M, high + GROUND_AROUND_M
+    low = points[:, :2].min(axis=0) - GROUND_AROUND_M
+    high = points[:, :2].max(axis=0) + GROUND_AROUND_M
     middles = find_cells(ground) + 0.5
     heights = ground[((middles >= low) & (middles <= high)).all(axis=1), 2]
     return float(np.median(points[:, 2]) - np.median(heights)) if len(heights) else None
 
 
-def group_cells(points: np.ndarray, is_core: np.ndarray) -> list[np.ndarray]:
-    """Return the members of each roof among cells `points` (k, 3).
+def group_cells(points: np.ndarray, is_core: np.ndarray) -> Iterator[np.ndarray]:
+    """Yield the members of each roof among cells `points` (k, 5).
 
     It has FEWEST_OUTSIDE of the core (k,) side by side that form a surface, and the cells beside
     these.
     """
-    core = np.flatnonzero(is_core)
-    cells = find_cells(points)
-    labels = label_components(len(core), link_neighbours(cells[core]))
-    numbers, sizes = np.unique(labels, return_counts=True)
-    result = []
-    for label in numbers[sizes >= FEWEST_OUTSIDE]:
+    core, keys = np.flatnonzero(is_core), find_keys(points)
+    labels = label_components(len(core), link_neighbours(keys[core]))
+    for label in np.flatnonzero(np.bincount(labels) >= FEWEST_OUTSIDE):
         members = core[labels == label]
-        if is_strip(points[members]) or measure_roughness(points[members]) > ROUGH_M:
-            continue
-        around = (cells[members][:, None] + AROUND).reshape(-1, 2)
-        grown = is_among(cells, around) & ~is_core
-        result.append(np.union1d(members, np.flatnonzero(grown)))
-    return result
+        cells = points[members, :3]
+        if not is_strip(cells) and measure_roughness(cells) <= ROUGH_M:
+            grown = np.isin(keys, keys[members, None] + AROUND_KEYS) & ~is_core
+            yield np.union1d(members, np.flatnonzero(grown))
 
 
 def touches(points: np.ndarray, outlines: shapely.STRtree, distance_m: float) -> np.ndarray:
-    """Return whether (k,) points (k, 3) lie in an outline or so near to one."""
-    result = np.zeros(len(points), bool)
+    """Return whether (k,) points (k, 2 or more) lie in an outline or so near to one."""
     xy = shapely.points(points[:, :2])
-    result[outlines.query(xy, predicate="dwithin", distance=distance_m)[0]] = True
-    return result
-
-
-def is_beside(points: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Return whether (k,) cells have one of `others` around them."""
-    around = (find_cells(points)[:, None] + AROUND).reshape(-1, 2)
-    is_known = is_among(around, find_cells(others)).reshape(-1, len(AROUND))
-    return np.asarray(is_known.any(axis=1))
-
-
-def is_among(cells: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Return whether (k,) `cells` (k, 2) are among `others` (m, 2)."""
-    return np.isin(cells @ KEY_OF_CELL, others @ KEY_OF_CELL)
-
-
-def draw_places(points: np.ndarray) -> shapely.Geometry:
-    """Return the outline of the cells of points (k, 3)."""
-    low = find_cells(points)
-    return shapely.union_all(shapely.box(*low.T, *(low + 1).T))
+    near = outlines.query(xy, predicate="dwithin", distance=distance_m)[0]
+    return np.isin(np.arange(len(points)), near)
