@@ -71,7 +71,7 @@ def test_a_building_that_fails_in_a_run_of_several_surveys_stops_no_other(
 ):
     take_surveys(town_files, later, tmp_path / "whole")
     expected = by_id(tmp_path / "whole")
-    raise_for(monkeypatch, best.TileSurveys, "is_same", KeyError("no such wall"))
+    raise_for(monkeypatch, best, "is_same", KeyError("no such wall"))
     check_failure(expected, tmp_path, lambda out: take_surveys(town_files, later, out), monkeypatch)
 
 
@@ -101,6 +101,6 @@ def test_a_damaged_terrain_model_ends_both_with_its_sentence(
     raise_for(monkeypatch, solve.Updater, "judge", damaged)
     with pytest.raises(DamagedRaster, match="expected a complete raster"):
         update(run, later, tmp_path / "updated")
-    raise_for(monkeypatch, best.TileSurveys, "is_same", damaged)
+    raise_for(monkeypatch, best, "is_same", damaged)
     with pytest.raises(DamagedRaster, match="expected a complete raster"):
         take_surveys(town_files, later, tmp_path / "several")

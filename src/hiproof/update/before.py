@@ -97,6 +97,7 @@ def prepare_surveys(
     save_roofs_outside(state, plan, bool(earlier.clouds))
     samples = draw_samples(state, plan, request.terrain)
     shift = register_surveys(samples, request.settings.read)
+    shift.refuse_other_heights(f"survey of {date}")
     shift.warn(f"survey of {date}")
     LOGGER.info("the new survey lies beside the earlier one by %s", shift.to_dict())
     texts = find_texts(request.run, plan)

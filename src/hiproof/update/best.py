@@ -7,7 +7,6 @@ on the same roof by the test of an update: then all points make the model.
 from __future__ import annotations
 
 import dataclasses
-import functools
 import json
 from pathlib import Path
 
@@ -16,13 +15,11 @@ import numpy as np
 from ..city.folder.ledger import Outcome
 from ..city.plan.overrides import load_overrides
 from ..city.plan.work_plan import Job, WorkPlan, load_plan
-from ..city.work.bundles import keep_failure
 from ..city.work.solve import (
     KeepFailure,
     open_terrain,
     solve_buildings,
     solve_one,
-    solve_safely,
 )
 from ..city.work.surveys import SurveyPoints
 from ..fit.bare_ground import LEAST_LOST_M2
@@ -62,14 +59,14 @@ def solve_best_tile(
     The other arguments are those of `solve_tile`.
     """
     root = Path(folder)
-    plan, overrides = load_plan(root), load_overrides(root)
-    surveys = TileSurveys(root, tile, terrain, names)
-    keep = functools.partial(keep_failure, root, lambda: surveys.unite(names).points, plan)
+    plan, overrides, shifts = load_plan(root), load_overrides(root), load_shifts(root)
+    steps = {name: shifts.get(name, SurveyShift()).clear_xyz for name in names}
+    surveys = SurveyPoints.load(root, tile, open_terrain(plan, terrain), steps, plan)
 
-    def solve(job: Job) -> tuple[Building, Fragments]:
-        return solve_best(plan, job, surveys, overrides.get(job.index), keep)
+    def solve(job: Job, keep: KeepFailure) -> tuple[Building, Fragments]:
+        return solve_best(plan, job, surveys, shifts, overrides.get(job.index), keep)
 
-    return solve_buildings(root, plan, tile, solve, keep, avoid)
+    return solve_buildings(root, plan, tile, solve, lambda: surveys.unite(names).points, avoid)
 
 
 def load_shifts(state: Path) -> dict[str, SurveyShift]:
@@ -78,70 +75,59 @@ def load_shifts(state: Path) -> dict[str, SurveyShift]:
     return {name: SurveyShift.from_dict(shift) for name, shift in record.items()}
 
 
-class TileSurveys:
-    """The points of all surveys in a work tile, where the newest has them."""
+def is_same(
+    building: Building, old: np.ndarray, new: np.ndarray, shifts: list[SurveyShift]
+) -> bool:
+    """Return whether the `new` points (n, 3) show the roof that the `old` ones made.
 
-    def __init__(self, root: Path, tile: str, terrain: str | None, names: tuple[str, ...]):
-        self.names, self.plan, self.shifts = names, load_plan(root), load_shifts(root)
-        steps = {name: self.shifts.get(name, SurveyShift()).clear_xyz for name in names}
-        model = open_terrain(self.plan, terrain)
-        self.unite = SurveyPoints.load(root, tile, model, steps, self.plan).unite
-
-    def select_roof(self, name: str, job: Job) -> np.ndarray:
-        """Return the roof points (n, 3) of a building in a survey."""
-        return select_roof(self.unite((name,)), job).points
-
-    def select_points(self, name: str, job: Job) -> np.ndarray:
-        """Return the points (n, 3) of a building and of bare ground in its outline in a survey."""
-        return select_points(self.unite((name,)), job)
-
-    def is_same(self, job: Job, building: Building, name: str, other: str) -> bool:
-        """Return whether another survey shows the roof that the survey `name` made."""
-        roof = building.roof
-        old, new = (
-            roof.frame.to_local(self.select_points(survey, job)) for survey in (name, other)
-        )
-        steps = [self.shifts[survey] for survey in (name, other) if survey in self.shifts]
-        shift = max(steps, key=lambda step: step.noise.roof, default=SurveyShift())
-        ground = Ground.under(building, roof.frame)
-        noise, sigma_m = shift.noise, shift.sigma[2]
-        verdict = judge_building(roof, old, new, ground, noise, sigma_m, SIGNIFICANCE)
-        return verdict.change is Change.UNCHANGED
+    `shifts` are those of both surveys, as far as they were estimated.
+    """
+    roof = building.roof
+    shift = max(shifts, key=lambda shift: shift.noise.roof, default=SurveyShift())
+    verdict = judge_building(
+        roof,
+        roof.frame.to_local(old),
+        roof.frame.to_local(new),
+        Ground.under(building, roof.frame),
+        shift.noise,
+        shift.sigma[2],
+        SIGNIFICANCE,
+    )
+    return verdict.change is Change.UNCHANGED
 
 
 def solve_best(
     plan: WorkPlan,
     job: Job,
-    surveys: TileSurveys,
+    surveys: SurveyPoints,
+    shifts: dict[str, SurveyShift],
     override: Override | None,
     keep: KeepFailure,
 ) -> tuple[Building, Fragments]:
-    """Return a building made of its best survey, and of those that agree.
-
-    Whatever goes wrong becomes its status.
-    """
-
-    def solve() -> tuple[Building, Fragments]:
-        attributes = job.footprint.attributes if job.footprint else {}
-        year = read_year(attributes.get(plan.settings.read.year_column))
-        known = [name for name in surveys.names if year is None or int(name[:4]) >= year]
-        remark = "" if known else f"its year, {year}, is after that of every survey"
-        names = known or surveys.names
-        roofs = {name: surveys.select_roof(name, job) for name in names}
-        name = choose_survey(roofs, {name: surveys.select_points(name, job) for name in names})
-        others = [other for other in names if other != name and len(roofs[other])]
-        building, texts = solve_one(plan, job, surveys.unite((name,)), override, keep)
-        if building.built is None:
-            return building, texts
-        used = (name, *(o for o in others if surveys.is_same(job, building, name, o)))
-        if len(used) > 1:
-            united, _ = solve_one(plan, job, surveys.unite(used), override, keep)
-            is_worse = united.built is None or adds_roof(united, building)
-            building, used = (building, used[:1]) if is_worse else (united, used)
-        result = dataclasses.replace(building, survey_date=name, epochs_used=tuple(sorted(used)))
-        return fragments(add_remark(result, remark), plan.list_names(job), plan.head)
-
-    return solve_safely(plan, job, solve, keep)
+    """Return a building made of its best survey, and of those that agree."""
+    attributes = job.footprint.attributes if job.footprint else {}
+    year = read_year(attributes.get(plan.settings.read.year_column))
+    known = [name for name in surveys.points if year is None or int(name[:4]) >= year]
+    remark = "" if known else f"its year, {year}, is after that of every survey"
+    views = {name: surveys.unite((name,)) for name in known or surveys.points}
+    roofs = {name: select_roof(view, job).points for name, view in views.items()}
+    points = {name: select_points(view, job) for name, view in views.items()}
+    first = choose_survey(roofs, points)
+    building, texts = solve_one(plan, job, views[first], override, keep)
+    if building.built is None:
+        return building, texts
+    used = [first]
+    for name in views:
+        steps = [shifts[survey] for survey in (first, name) if survey in shifts]
+        is_other = name != first and len(roofs[name]) > 0
+        if is_other and is_same(building, points[first], points[name], steps):
+            used.append(name)
+    if len(used) > 1:
+        united, _ = solve_one(plan, job, surveys.unite(tuple(used)), override, keep)
+        is_worse = united.built is None or adds_roof(united, building)
+        building, used = (building, used[:1]) if is_worse else (united, used)
+    result = dataclasses.replace(building, survey_date=first, epochs_used=tuple(sorted(used)))
+    return fragments(add_remark(result, remark), plan.list_names(job), plan.head)
 
 
 def adds_roof(united: Building, building: Building) -> bool:

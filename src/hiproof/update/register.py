@@ -165,67 +165,49 @@ class SurveyShift:
             values[name] = tuple(values[name])
         return SurveyShift(**values | {"noise": SurveyNoise(**values["noise"])})
 
-    def warn(self, name: str) -> None:
-        """Warn (InputWarning) of what the shift of the survey `name` does not explain.
-
-        Raises InputError where heights are of another unit or system.
-        """
+    def refuse_other_heights(self, name: str) -> None:
+        """Raise InputError where heights of the survey `name` are of another unit or system."""
         if self.doubt and abs(self.ground) > MOST_GROUND_M:
             raise InputError(
                 f"{name}: {self.doubt}; its heights seem to be of another unit or system. "
                 "Transform them, pass their shift with --shift EAST,NORTH,UP, or --shift off if "
                 "the ground did move"
             )
-        if self.doubt:
-            warnings.warn(
-                f"{name}: {self.doubt}; no shift is taken off. If the survey is shifted, pass it "
-                "with --shift EAST,NORTH,UP",
-                InputWarning,
-            )
-        elif 2 * self.agreeing < self.roofs and self.places:
-            warnings.warn(
-                f"{name}: {self.roofs - self.agreeing} of {self.roofs} sampled roofs lie elsewhere "
-                "than the ground between the surveys, so they count as changed; if the ground is "
-                "wrong, pass the shift of the survey with --shift EAST,NORTH,UP",
-                InputWarning,
-            )
-        elif not self.places and self.clear_xyz[2] and self.sigma[2]:  # estimated, not given
-            warnings.warn(
-                f"{name}: the shift of {self.xyz[2]:+.2f} m in height rests on roofs alone "
-                f"({self.rests_on}), because no ground around them lies in both surveys. It would "
-                "hide that all roofs were raised or lowered alike. If they were, pass --shift off, "
-                "and if the shift is known, --shift EAST,NORTH,UP",
-                InputWarning,
-            )
-        if self.repeated:
-            warnings.warn(
-                f"{name}: {self.repeated} of {self.roofs} sampled roofs have the points of the "
-                "earlier survey, which show no change; name the clouds of the new survey alone",
-                InputWarning,
-            )
-        if self.moved and not (self.doubt or self.tilt):
-            warnings.warn(
-                f"{name}: {self.moved} of {self.roofs} sampled roofs lie elsewhere together with "
-                "the ground around them: strips of a survey do not fit each other, or the ground "
-                "moved. Such roofs count as raised or lowered; check their ground first",
-                InputWarning,
-            )
-        x, y, _ = self.xyz
-        is_estimated = not self.doubt and self.sigma[0] > 0
-        if is_estimated and self.agreeing < FEWEST_ROOFS and math.hypot(x, y) > USUAL_ASIDE_M:
-            warnings.warn(
-                f"{name}: the shift of {x:+.2f} m to the east and {y:+.2f} m to the north rests on "
-                f"{self.agreeing} of {self.roofs} sampled roofs. So few may show their own changes "
-                "or another shift; if it is known, pass --shift EAST,NORTH,UP",
-                InputWarning,
-            )
-        if self.tilt:
-            warnings.warn(
-                f"{name}: the surveys are tilted to each other, by {self.tilt:.2f} m from one end "
-                "to the other. No tilt is taken off, so smaller changes of height are not found; "
-                "correct the heights of the strips for these",
-                InputWarning,
-            )
+
+    def warn(self, name: str) -> None:
+        """Warn (InputWarning) of what the shift of the survey `name` does not explain."""
+        x, y, z = self.xyz
+        is_estimated, elsewhere = self.sigma[2] > 0 and not self.doubt, self.roofs - self.agreeing
+        is_aside = math.hypot(x, y) > USUAL_ASIDE_M
+        contradicts_ground = not self.doubt and 2 * self.agreeing < self.roofs and self.places
+        doubts = {
+            f"{self.doubt}; no shift is taken off. If the survey is shifted, pass it with --shift "
+            "EAST,NORTH,UP": self.doubt,
+            f"{elsewhere} of {self.roofs} sampled roofs lie elsewhere than the ground between the "
+            "surveys, so they count as changed; if the ground is wrong, pass the shift of the "
+            "survey with --shift EAST,NORTH,UP": contradicts_ground,
+            f"the shift of {z:+.2f} m in height rests on roofs alone ({self.rests_on}), because no "
+            "ground around them lies in both surveys. It would hide that all roofs were raised or "
+            "lowered alike. If they were, pass --shift off, and if the shift is known, --shift "
+            "EAST,NORTH,UP": is_estimated and not self.places and self.clear_xyz[2],
+            f"{self.repeated} of {self.roofs} sampled roofs have the points of the earlier survey, "
+            "which show no change; name the clouds of the new survey alone": self.repeated,
+            f"{self.moved} of {self.roofs} sampled roofs lie elsewhere together with the ground "
+            "around them: strips of a survey do not fit each other, or the ground moved. Such "
+            "roofs count as raised or lowered; check their ground first": self.moved
+            and not (self.doubt or self.tilt),
+            f"the shift of {x:+.2f} m to the east and {y:+.2f} m to the north rests on "
+            f"{self.agreeing} of {self.roofs} sampled roofs. So few may show their own changes or "
+            "another shift; if it is known, pass --shift EAST,NORTH,UP": is_estimated
+            and self.agreeing < FEWEST_ROOFS
+            and is_aside,
+            f"the surveys are tilted to each other, by {self.tilt:.2f} m from one end to the "
+            "other. No tilt is taken off, so smaller changes of height are not found; correct the "
+            "heights of the strips for these": self.tilt,
+        }
+        for sentence, holds in doubts.items():
+            if holds:
+                warnings.warn(f"{name}: {sentence}", InputWarning)
 
 
 def read_shift(text: str) -> tuple[float, float, float] | None:
@@ -288,7 +270,8 @@ def register_surveys(samples: Iterable[SampledRoof], read: ReadSettings) -> Surv
     rises = [measure_level(sample.ground, shift) - shift[2] for sample, _ in pairs]
     is_moved = (np.abs(rises) > SAME_HEIGHT_M) & (np.abs(offsets - rises) < SAME_HEIGHT_M)
     is_moved &= [len(sample.ground) > 0 for sample, _ in pairs]
-    roofs = place_roofs(pairs, offsets)
+    origins = np.array([sample.roof.frame.origin[:2] for sample, _ in pairs])
+    roofs = np.column_stack([origins, offsets])
     result = SurveyShift(
         tuple(np.round(shift, 4).tolist()),
         tuple(np.round(sigma, 4).tolist()),
@@ -333,12 +316,6 @@ def measure_ground(samples: list[SampledRoof]) -> np.ndarray:
     """Return places, how much higher the new ground lies there, and its slopes (n, 5)."""
     places = [np.median(s.ground, axis=0) for s in samples if len(s.ground)]
     return np.array(places).reshape(-1, 5)
-
-
-def place_roofs(pairs: list[tuple[SampledRoof, Any]], off: np.ndarray) -> np.ndarray:
-    """Return places (n, 3) of roofs that lie `off` (n,) from where a shift puts them."""
-    origins = np.array([sample.roof.frame.origin[:2] for sample, _ in pairs])
-    return np.column_stack([origins, off])
 
 
 def measure_tilt(places: np.ndarray, roofs: np.ndarray) -> float:

@@ -71,6 +71,7 @@ def register_epochs(
     read = request.settings.read
     shifts = {name: register_surveys(found, read) for name, found in samples.items()}
     for name, shift in shifts.items():
+        shift.refuse_other_heights(f"survey {name}")
         shift.warn(f"survey {name}")
     return shifts
 

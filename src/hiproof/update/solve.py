@@ -8,7 +8,6 @@ is reconstructed from the new points.
 from __future__ import annotations
 
 import dataclasses
-import functools
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,13 +19,12 @@ import shapely
 from ..city.folder.ledger import Outcome
 from ..city.plan.overrides import load_overrides
 from ..city.plan.work_plan import Job, WorkPlan, load_plan
-from ..city.work.bundles import keep_failure
 from ..city.work.solve import (
     KeepFailure,
+    keep_nothing,
     pass_over_failure,
     solve_buildings,
     solve_one,
-    solve_safely,
 )
 from ..model import Building, Roof
 from ..parametric.building import build, with_model
@@ -80,28 +78,17 @@ def update_tile(
     The arguments are those of `solve_tile`.
     """
     root = Path(folder)
-    updater, members = make_updater(root, tile, terrain, SURVEYS_FILE), load_members(root)
-    plan = updater.plan
+    updater, members = Updater.load(root, tile, terrain, SURVEYS_FILE), load_members(root)
+    plan, points = updater.plan, updater.epochs.new.points
 
-    def update(job: Job) -> tuple[Building, Fragments]:
-        building = updater.update(job, UpdateMember.read(members[job.index], job))
+    def update(job: Job, keep: KeepFailure) -> tuple[Building, Fragments]:
+        member = UpdateMember.read(members[job.index], job)
+        building = dataclasses.replace(updater, keep=keep).update(job, member)
         if isinstance(building, KeptBuilding):
             return building, building.texts
         return fragments(building, plan.list_names(job), plan.head)
 
-    def solve(job: Job) -> tuple[Building, Fragments]:
-        return solve_safely(plan, job, functools.partial(update, job), updater.keep)
-
-    return solve_buildings(root, plan, tile, solve, updater.keep, avoid)
-
-
-def make_updater(root: Path, tile: str, terrain: str | None, file: str) -> Updater:
-    """Make the updater of a work tile by the surveys in `file`."""
-    plan, surveys = load_plan(root), Surveys.load(root / file)
-    epochs = Epochs(root, tile, terrain, surveys.shift.clear_xyz)
-    keep = functools.partial(keep_failure, root, lambda: epochs.new.points, plan)
-    texts = load_texts(surveys.texts, tile, plan.head)
-    return Updater(plan, epochs, surveys, keep, texts, load_overrides(root))
+    return solve_buildings(root, plan, tile, update, lambda: points, avoid)
 
 
 def judge_tile(folder: str, tile: str, terrain: str | None = None) -> list[float]:
@@ -110,7 +97,7 @@ def judge_tile(folder: str, tile: str, terrain: str | None = None) -> list[float
     One that fails is left to `update_tile`, which says so.
     """
     root, chances = Path(folder), []
-    updater, members = make_updater(root, tile, terrain, JUDGING_FILE), load_members(root)
+    updater, members = Updater.load(root, tile, terrain, JUDGING_FILE), load_members(root)
     for index in updater.plan.tiles[tile]:
         job = updater.plan.jobs[index]
         with pass_over_failure(job):
@@ -128,9 +115,17 @@ class Updater:
     plan: WorkPlan
     epochs: Epochs
     surveys: Surveys
-    keep: KeepFailure
     texts: dict[bytes, Fragments]
     overrides: dict[int, Override]
+    keep: KeepFailure = keep_nothing
+
+    @classmethod
+    def load(cls, root: Path, tile: str, terrain: str | None, file: str) -> Updater:
+        """Load what a work tile is brought up to date with, by the surveys in `file`."""
+        plan, surveys = load_plan(root), Surveys.load(root / file)
+        epochs = Epochs(root, tile, terrain, surveys.shift.clear_xyz)
+        texts = load_texts(surveys.texts, tile, plan.head)
+        return cls(plan, epochs, surveys, texts, load_overrides(root))
 
     @property
     def near_m(self) -> float:

@@ -352,28 +352,29 @@ def solve_tile(
     """
     root = Path(folder)
     plan = load_plan(root)
-    surroundings = Surroundings(load_points(root, tile), open_terrain(plan, terrain), plan)
+    points = load_points(root, tile)
+    surroundings = Surroundings(points, open_terrain(plan, terrain), plan)
     overrides = load_overrides(root)
-    keep = functools.partial(keep_failure, root, lambda: surroundings.points, plan)
 
-    def solve(job: Job) -> tuple[Building, Fragments]:
+    def solve(job: Job, keep: KeepFailure) -> tuple[Building, Fragments]:
         return solve_one(plan, job, surroundings, overrides.get(job.index), keep)
 
-    return solve_buildings(root, plan, tile, solve, keep, avoid)
+    return solve_buildings(root, plan, tile, solve, lambda: points, avoid)
 
 
 def solve_buildings(
     root: Path,
     plan: WorkPlan,
     tile: str,
-    solve: Callable[[Job], tuple[Building, Fragments]],
-    keep: KeepFailure,
+    solve: Callable[[Job, KeepFailure], tuple[Building, Fragments]],
+    load: Callable[[], dict[str, np.ndarray]],
     avoid: tuple[int, ...],
 ) -> list[Outcome]:
     """Solve the open buildings of `tile`, and write a file of their texts.
 
-    `keep` is called with those to `avoid`.
+    Of those that fail, or that are to `avoid`, the points are kept, which `load` returns by kind.
     """
+    keep = functools.partial(keep_failure, root, load, plan)
     parts, rows = [], []
     for index in load_redo(root).get(tile, plan.tiles[tile]):
         job, start = plan.jobs[index], time.perf_counter()
@@ -381,7 +382,7 @@ def solve_buildings(
             building, part = record_failure(plan, job, DIED)
             keep(job, DIED, None)
         else:
-            building, part = solve(job)
+            building, part = solve_safely(plan, job, functools.partial(solve, job, keep), keep)
         parts.append(part)
         rows.append(make_outcome(index, building, time.perf_counter() - start))
         count_building()
