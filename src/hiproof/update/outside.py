@@ -86,11 +86,11 @@ class SurveyCells:
     def save(self, path: Path) -> None:
         """Write the cells of a file, with the corners (2, 2) of their box."""
         path.parent.mkdir(parents=True, exist_ok=True)
-        arrays = {kind: join_cells(chunks) for kind, chunks in self.found.items()}
+        arrays: dict[str, Any] = {kind: join_cells(found) for kind, found in self.found.items()}
         xy = np.concatenate(list(arrays.values()))[:, :2]
         box = [xy.min(axis=0, initial=np.inf), xy.max(axis=0, initial=-np.inf)]
         with atomic_file(path) as file:
-            np.savez(file, **arrays, box=np.array(box), has_classes=np.array(self.has_classes))
+            np.savez(file, **arrays, box=box, has_classes=self.has_classes)
 
 
 def sort_survey(folder: str, number: int, address: str, epoch: str = "") -> dict:
