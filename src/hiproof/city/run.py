@@ -31,7 +31,7 @@ from ..write.head import FileHead
 from .folder.ledger import Failure, Ledger
 from .folder.marks import hold_folder
 from .folder.resume import explain_full_disk, open_ledger, open_state, resume_or_plan
-from .merge.join import TEXTS_FOLDER, claims, merge, output_files
+from .merge.join import TEXTS_FOLDER, claims, list_output_files, merge
 from .plan.checks import refuse_unusable
 from .plan.from_cloud import Progress
 from .plan.from_overture import choose_footprints, read_source
@@ -166,7 +166,7 @@ def reconstruct_in_folder(
         )
         write_run_record(request, plan, summary)
         if ledger.get("merged") != "yes":
-            ledger.claim(claims(output_files(plan, Path(request.out)), Path(request.out)))
+            ledger.claim(claims(list_output_files(plan, Path(request.out)), Path(request.out)))
         clean(state, ledger)
         return summary
     except sqlite3.OperationalError as error:

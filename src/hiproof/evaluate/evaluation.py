@@ -22,6 +22,7 @@ import shapely
 
 from ..frames import LocalFrame
 from ..model import ROOF, Quality, Solid
+from ..model.roof_figures import roof_figures
 from ..write.values import round_value
 from .metrics import compute_share_within_20cm, iou, plan_outline, quality, well_inside
 from .models import BuildingModel
@@ -85,8 +86,6 @@ def evaluate_building(
         )
         missed = Quality(points=len(points), share_within_20cm=share)
         return BuildingFigures(model.id, model.roof_type, model.status, missed)
-    from ..model.roof_figures import roof_figures
-
     frame = LocalFrame.around(model.solid.vertices)
     solid = model.solid.move(-frame.origin)
     local = frame.to_local(points).reshape(-1, 3)
@@ -106,8 +105,6 @@ def evaluate_building(
 
 def compare(solid: Solid, reference_id: str, reference: Solid) -> Comparison:
     """Return the differences of two solids in one frame, that of azimuths signed and least."""
-    from ..model.roof_figures import roof_figures
-
     if not (solid.select_faces(ROOF) and reference.select_faces(ROOF)):
         return Comparison(reference_id)
     figures, theirs = roof_figures(solid), roof_figures(reference)
@@ -178,8 +175,7 @@ def summarise(figures: Sequence[BuildingFigures]) -> dict[str, dict[str, Any]]:
 def column_summaries(figures: Sequence[BuildingFigures]) -> dict[str, dict[str, float]]:
     rows = [f.row() for f in figures]
     summaries = {}
-    names = dict.fromkeys(name for row in sorted(rows, key=len, reverse=True) for name in row)
-    for name in [name for name in names if name not in TEXT_COLUMNS]:
+    for name in [name for name in list_columns(rows) if name not in TEXT_COLUMNS]:
         values = np.array([row.get(name, np.nan) for row in rows], float)
         values = values[np.isfinite(values)]
         if len(values):
@@ -192,16 +188,17 @@ def column_summaries(figures: Sequence[BuildingFigures]) -> dict[str, dict[str, 
     return summaries
 
 
+def list_columns(rows: list[dict[str, Any]]) -> list[str]:
+    """Return the columns of all rows in the order of the longest."""
+    return list(dict.fromkeys(name for row in sorted(rows, key=len, reverse=True) for name in row))
+
+
 def to_csv(figures: Sequence[BuildingFigures]) -> str:
     """Format figures as a header and a line a building; empty without figures."""
     rows = [f.row() for f in figures]
-    columns = dict.fromkeys(name for row in sorted(rows, key=len, reverse=True) for name in row)
-    if not columns:
-        columns = dict.fromkeys(
-            ["id", "type", "status", "quality", *(f.name for f in fields(Quality))]
-        )
+    columns = list_columns(rows) or [*TEXT_COLUMNS[:4], *(f.name for f in fields(Quality))]
     text = io.StringIO()
-    writer = csv.DictWriter(text, list(columns), restval="", lineterminator="\n")
+    writer = csv.DictWriter(text, columns, restval="", lineterminator="\n")
     writer.writeheader()
     writer.writerows({name: round_figure(value) for name, value in row.items()} for row in rows)
     return text.getvalue()

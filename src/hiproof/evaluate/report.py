@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
+from collections.abc import Sequence
 from html import escape
 from importlib.resources import files
 from pathlib import Path
@@ -205,46 +206,46 @@ def find_overview(run: EvaluatedRun) -> Overview:
 
 def status_table(run: EvaluatedRun) -> str:
     counts = Counter(model.status for model in run.models)
-    rows = "".join(
-        f"<tr><td>{count}</td><td>{escape(sentence(code))}</td></tr>"
+    known = Status.__members__
+    rows = [
+        (count, escape(known[code.upper()].value if code.upper() in known else code))
         for code, count in counts.most_common()
-    )
-    return f"<table>{head_row('buildings', 'outcome')}{rows}</table>"
+    ]
+    return make_table(("buildings", "outcome"), rows)
 
 
 def grade_table(run: EvaluatedRun) -> str:
     """Return how many models are good, fair and poor; empty without verdicts."""
     counts = Counter(model.grade for model in run.models)
-    rows = "".join(
-        f"<tr><td>{counts[grade.code]}</td><td>{grade.code}: {escape(grade.value)}</td></tr>"
+    rows = [
+        (counts[grade.code], f"{grade.code}: {escape(grade.value)}")
         for grade in Grade
         if counts[grade.code]
+    ]
+    return make_table(("models", "quality"), rows) if rows else ""
+
+
+def make_table(head: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
+    """Return a table of rows of cells, a cell in a `th` as it is."""
+    names = "".join(f'<th scope="col">{name}</th>' for name in head)
+    body = "".join(
+        f"<tr>{''.join(c if str(c)[:3] == '<th' else f'<td>{c}</td>' for c in row)}</tr>"
+        for row in rows
     )
-    return f"<table>{head_row('models', 'quality')}{rows}</table>" if rows else ""
-
-
-def head_row(*names: str) -> str:
-    cells = "".join(f'<th scope="col">{name}</th>' for name in names)
-    return f"<thead><tr>{cells}</tr></thead>"
-
-
-def sentence(code: str) -> str:
-    status = Status.__members__.get(code.upper())
-    return status.value if status else code
+    return f"<table><thead><tr>{names}</tr></thead>{body}</table>"
 
 
 def figure_table(run: EvaluatedRun) -> str:
     """Return the table of mean figures by roof type."""
-    head = head_row("type", "buildings", *TABLE_FIGURES.values())
-    rows = ""
-    for kind, figures in summarise(run.figures).items():
-        cells = "".join(
-            f"<td>{figures[name]['mean']:.3f}</td>" if name in figures else "<td></td>"
-            for name in TABLE_FIGURES
+    rows = [
+        (
+            f'<th scope="row">{escape(describe_type(kind))}</th>',
+            figures["buildings"],
+            *(f"{figures[k]['mean']:.3f}" if k in figures else "" for k in TABLE_FIGURES),
         )
-        head_cell = f'<th scope="row">{escape(describe_type(kind))}</th>'
-        rows += f"<tr>{head_cell}<td>{figures['buildings']}</td>{cells}</tr>"
-    return f"<table>{head}{rows}</table>"
+        for kind, figures in summarise(run.figures).items()
+    ]
+    return make_table(("type", "buildings", *TABLE_FIGURES.values()), rows)
 
 
 def distributions(run: EvaluatedRun) -> str:

@@ -12,7 +12,7 @@ import itertools
 import re
 import struct
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -93,8 +93,12 @@ def read_date(text: str) -> str:
 
 def date_by_headers(clouds: tuple[str, ...]) -> str:
     """Return the last day on which LAS files were written, "" for none."""
-    headed = [date for date in map(date_by_header, clouds) if date]
-    return max(headed).isoformat() if headed else ""
+    return find_latest(map(date_by_header, clouds))
+
+
+def find_latest(days: Iterable[datetime.date | None]) -> str:
+    known = list(filter(None, days))
+    return max(known).isoformat() if known else ""
 
 
 def date_by_header(path: str) -> datetime.date | None:
@@ -111,8 +115,7 @@ def date_by_header(path: str) -> datetime.date | None:
 
 def date_by_points(clouds: tuple[str, ...]) -> str:
     """Return the last day on which points of LAS files were measured, "" for none."""
-    timed = [date for date in map(date_by_first_points, clouds) if date]
-    return max(timed).isoformat() if timed else ""
+    return find_latest(map(date_by_first_points, clouds))
 
 
 def date_by_first_points(path: str) -> datetime.date | None:

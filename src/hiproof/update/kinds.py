@@ -72,22 +72,27 @@ class Difference:
 
 @dataclass(frozen=True)
 class BeforeAfter:
-    """A building before and after, with the part that shows at each cell.
+    """The compared cells (k,) of a building, with the part that shows there before and after.
 
-    Both roofs are in one frame.
-
-    `after` is None where no new roof was found that explains the new points. `on_ground` (k,) are
-    the cells where the new points lie on the ground, `sigma_m` is the standard deviation of the
-    common vertical shift.
+    `members` (k,) are their numbers in the `comparison`, `difference` (k,) is how much higher they
+    lie now, and `on_ground` (k,) whether they do on the ground. The `after` of the two roofs, both
+    in one frame, is None where none was found that explains the new points. `sigma_m` is the
+    standard deviation of the common vertical shift.
     """
 
-    cells: CellComparison
+    comparison: CellComparison
+    members: np.ndarray
     before: Roof
     after: Roof | None
-    part_before: np.ndarray
-    part_after: np.ndarray
+    parts: tuple[np.ndarray, np.ndarray]
+    difference: np.ndarray
     on_ground: np.ndarray
     sigma_m: float
+
+    def find_pair(self, inside: np.ndarray) -> tuple[int, int]:
+        """Return the parts that show at most of the cells `inside` (k,), -1 where none does."""
+        first, second = (find_main(shown[inside]) for shown in self.parts)
+        return first, second
 
 
 def name_differences(
@@ -99,20 +104,19 @@ def name_differences(
     points.
     """
     c = verdict.comparison
-    with np.errstate(invalid="ignore"):
-        height = find_heights(before, c) + c.new - verdict.ground.height_at(c.centres)
-        on_ground = height < OVER_GROUND_M
-    shown = show_parts(before, c.centres)
-    shown_after = np.full(len(shown), -1) if after is None else show_parts(after, c.centres)
-    sides = BeforeAfter(c, before, after, shown, shown_after, on_ground, sigma_m)
-    inside = np.zeros(len(c.cells), bool)
-    for cluster in verdict.clusters:
-        inside[cluster.members] = True
-    whole = name_whole(verdict, inside, sides)
+    members = np.flatnonzero(c.is_compared)
+    xy = c.centres[members]
+    height = (find_heights(before, c) + c.new)[members] - verdict.ground.height_at(xy)
+    shown_after = np.full(len(members), -1) if after is None else show_parts(after, xy)
+    parts, on_ground = (show_parts(before, xy), shown_after), height < OVER_GROUND_M
+    d = c.difference[members]
+    sides = BeforeAfter(c, members, before, after, parts, d, on_ground, sigma_m)
+    places = [np.isin(members, cluster.members) for cluster in verdict.clusters]
+    whole = name_whole(np.logical_or.reduce([np.zeros(len(members), bool), *places]), sides)
     if whole is not None:
         return [whole]
-    result = [name_cluster(cluster, sides) for cluster in verdict.clusters]
-    return sorted(result, key=lambda item: -item.area_m2)
+    named = [name_cluster(*item, sides) for item in zip(verdict.clusters, places, strict=True)]
+    return sorted(named, key=lambda item: -item.area_m2)
 
 
 def name_doubts(verdict: ChangeVerdict) -> list[Difference]:
@@ -130,70 +134,56 @@ def name_doubts(verdict: ChangeVerdict) -> list[Difference]:
     ]
 
 
-def name_whole(verdict: ChangeVerdict, inside: np.ndarray, sides: BeforeAfter) -> Difference | None:
+def name_whole(inside: np.ndarray, sides: BeforeAfter) -> Difference | None:
     """Name the change of a roof as a whole, None where only places of it changed.
 
     `inside` (k,) are the cells of all clusters. A roof of another type or slope crosses the earlier
     one, so fewer cells contradict it.
     """
-    c = sides.cells
-    members = np.flatnonzero(c.is_compared)
-    share = inside.sum() / len(members)
-    moved = find_moved(inside, c)
-    pair = find_main(sides.part_before[members]), find_main(sides.part_after[members])
-    kind, d = None, c.difference[members]
-    if not verdict.clusters or (
-        moved[members].mean() >= AS_ONE_SHARE and moves_together(d) and has_all(moved, sides)
+    d, everywhere = sides.difference, np.ones(len(inside), bool)
+    moved, pair = find_moved(inside, d), sides.find_pair(everywhere)
+    kind = None
+    if not inside.any() or (
+        moved.mean() >= AS_ONE_SHARE and moves_together(d) and has_all(moved, sides.parts[0])
     ):
         kind = ChangeKind.ROOF_RAISED if np.median(d) > 0 else ChangeKind.ROOF_LOWERED
     elif (
         is_same_place(pair, sides)
         and not sides.on_ground[inside].any()
-        and not moves_together(c.difference[inside])
+        and not moves_together(d[inside])
     ):
-        if share >= CROSSING and is_other_type(pair, sides):
-            kind = ChangeKind.TYPE_CHANGED
-        elif share >= HALF and not is_other_type(pair, sides):
-            kind = ChangeKind.SLOPE_CHANGED
-    if kind is None:
-        return None
-    return describe_place(kind, np.isin(np.arange(len(c.cells)), members), pair, sides)
+        is_other = is_other_type(pair, sides)
+        if inside.mean() >= (CROSSING if is_other else HALF):
+            kind = ChangeKind.TYPE_CHANGED if is_other else ChangeKind.SLOPE_CHANGED
+    return kind and describe_place(kind, everywhere, pair, sides)
 
 
-def find_moved(inside: np.ndarray, comparison: CellComparison) -> np.ndarray:
+def find_moved(inside: np.ndarray, d: np.ndarray) -> np.ndarray:
     """Return whether (k,) each cell moved like most of those `inside` (k,) all clusters.
 
-    The differences of many cells are too small to count by themselves.
+    Cells lie higher by `d` (k,). The differences of many are too small to count by themselves.
     """
-    d = comparison.difference
-    with np.errstate(invalid="ignore"):
-        return np.asarray(np.abs(d - np.median(d[inside])) < np.abs(d)) if inside.any() else inside
+    return np.asarray(np.abs(d - np.median(d[inside])) < np.abs(d)) if inside.any() else inside
 
 
-def has_all(inside: np.ndarray, sides: BeforeAfter) -> bool:
-    """Return whether half of the cells of each larger part before are `inside` (k,)."""
-    compared = sides.cells.is_compared
-    parts, counts = np.unique(sides.part_before[compared], return_counts=True)
-    shares = [
-        share_of_part(sides.part_before == part, inside, compared)
-        for part in parts[counts >= LARGER * compared.sum()]
-    ]
-    return min(shares, default=1.0) >= HALF
+def has_all(inside: np.ndarray, shown: np.ndarray) -> bool:
+    """Return whether half of the cells of each larger part `shown` (k,) are `inside` (k,)."""
+    parts, counts = np.unique(shown, return_counts=True)
+    larger = parts[counts >= LARGER * len(shown)]
+    return min((share_of_part(shown == part, inside) for part in larger), default=1.0) >= HALF
 
 
-def name_cluster(cluster: ChangedCells, sides: BeforeAfter) -> Difference:
-    """Name the change of a place of a roof."""
-    c = sides.cells
-    inside = np.zeros(len(c.cells), bool)
-    inside[cluster.members] = True
-    pair = find_main(sides.part_before[inside]), find_main(sides.part_after[inside])
-    of_before, of_after = sides.part_before == pair[0], sides.part_after == pair[1]
-    share_before = share_of_part(of_before, inside, c.is_compared)
-    share_after = share_of_part(of_after, inside, c.is_compared)
+def name_cluster(cluster: ChangedCells, inside: np.ndarray, sides: BeforeAfter) -> Difference:
+    """Name the change of a place of a roof, whose cells are `inside` (k,)."""
+    pair = sides.find_pair(inside)
+    share_before, share_after = (
+        share_of_part(shown == part, inside) for shown, part in zip(sides.parts, pair, strict=True)
+    )
     is_part = share_before >= AS_ONE_SHARE and len(sides.before.parts) > 1
+    together = moves_together(sides.difference[inside])
     if sides.on_ground[inside].mean() > HALF:
         kind = ChangeKind.PART_REMOVED
-    elif is_part and is_same_place(pair, sides) and not moves_together(c.difference[inside]):
+    elif is_part and is_same_place(pair, sides) and not together:
         other = is_other_type(pair, sides)
         kind = ChangeKind.TYPE_CHANGED if other else ChangeKind.SLOPE_CHANGED
     elif cluster.area_m2 < SMALL_M2 or abs(cluster.difference_m) < THIN_LAYER_M:
@@ -211,12 +201,11 @@ def describe_place(
     kind: ChangeKind, inside: np.ndarray, pair: tuple[int, int], sides: BeforeAfter
 ) -> Difference:
     """Return the place of a change over the cells `inside` (k,)."""
-    c = sides.cells
-    d, s = c.difference[inside], c.sigma[inside]
-    sigma = math.hypot(sides.sigma_m, math.sqrt(MEDIAN_VARIANCE * np.mean(s**2) / len(d)))
-    area = len(d) * c.cell_m2
-    place = draw_cells(c.cells[inside], c.cell_m)
-    return Difference(kind, float(np.median(d)), sigma, area, place, pair)
+    c, members = sides.comparison, sides.members[inside]
+    variance = MEDIAN_VARIANCE * np.mean(c.sigma[members] ** 2) / len(members)
+    sigma = math.hypot(sides.sigma_m, math.sqrt(variance))
+    middle, area = float(np.median(sides.difference[inside])), len(members) * c.cell_m2
+    return Difference(kind, middle, sigma, area, draw_cells(c.cells[members], c.cell_m), pair)
 
 
 def moves_together(differences: np.ndarray) -> bool:
@@ -228,12 +217,9 @@ def moves_together(differences: np.ndarray) -> bool:
 
 def is_same_place(pair: tuple[int, int], sides: BeforeAfter) -> bool:
     """Return whether a part before and one after take the same place."""
-    if min(pair) < 0:
-        return False
-    first, second = sides.part_before == pair[0], sides.part_after == pair[1]
-    union = (first | second) & sides.cells.is_compared
-    common = first & second & sides.cells.is_compared
-    return float(common.sum() / max(union.sum(), 1)) >= SAME_PART
+    first, second = (shown == part for shown, part in zip(sides.parts, pair, strict=True))
+    share = (first & second).sum() / max((first | second).sum(), 1)
+    return min(pair) >= 0 and bool(share >= SAME_PART)
 
 
 def find_main(parts: np.ndarray) -> int:
@@ -242,9 +228,9 @@ def find_main(parts: np.ndarray) -> int:
     return int(np.bincount(known).argmax()) if 2 * len(known) >= len(parts) > 0 else -1
 
 
-def share_of_part(of_part: np.ndarray, inside: np.ndarray, compared: np.ndarray) -> float:
-    """Return the share of a part's compared cells that lie inside a cluster."""
-    return float((of_part & inside).sum() / max((of_part & compared).sum(), 1))
+def share_of_part(of_part: np.ndarray, inside: np.ndarray) -> float:
+    """Return the share of a part's cells that lie inside a cluster."""
+    return float((of_part & inside).sum() / max(of_part.sum(), 1))
 
 
 def is_other_type(pair: tuple[int, int], sides: BeforeAfter) -> bool:

@@ -19,11 +19,11 @@ from typing import Any
 
 from ... import __version__
 from ...errors import OutputError, OutputWarning
-from ...formats import FORMATS
+from ...formats import FORMATS, list_requested_files
 from ...log import LOGGER, count_things
 from ...masking import masked_values
 from ...write.files import atomic, save_text
-from ..merge.join import TEXTS_FOLDER, broken_claims, remove_tiles, whole_files, write_tile
+from ..merge.join import TEXTS_FOLDER, broken_claims, remove_tiles, write_tile
 from ..plan.from_cloud import Progress
 from ..plan.overrides import REDO, keep_overrides
 from ..plan.prepare import make_plan
@@ -251,10 +251,10 @@ def remove_unrequested(plan: WorkPlan, out: Path, ledger: Ledger) -> None:
 
     They would pass for its own.
     """
-    earlier, requested = {claim.name for claim in ledger.claims()}, whole_files(plan, out).values()
-    for name in (format.file for format in FORMATS.values() if format.fragment):
-        if name in earlier and out / name not in requested:
-            (out / name).unlink(missing_ok=True)
+    of_formats = {format.file for format in FORMATS.values() if format.fragment}
+    requested = {path.name for path in list_requested_files(plan.settings, out).values()}
+    for name in {claim.name for claim in ledger.claims()} & of_formats - requested:
+        (out / name).unlink(missing_ok=True)
 
 
 def forget(state: Path, ledger: Ledger) -> None:

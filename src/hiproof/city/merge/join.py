@@ -52,7 +52,7 @@ def merge(
             progress("merge", number, len(plan.tiles))
             yield from load_texts(state, ledger.texts(tile))
 
-    join_fragments(whole_files(plan, out), iterate_fragments(), head)
+    join_fragments(list_requested_files(plan.settings, out), iterate_fragments(), head)
 
 
 def load_texts(state: Path, places: Iterable[tuple[str, int]]) -> Iterator[Fragments]:
@@ -80,28 +80,17 @@ def number_text_file(file: Path) -> int:
     return int(file.name.split(".")[1])
 
 
-def output_files(plan: WorkPlan, out: Path) -> list[Path]:
+def list_output_files(plan: WorkPlan, out: Path) -> list[Path]:
     """Return all files that a run of this plan writes.
 
     The record of the run is left out.
     """
+    tiles = (list_requested_tile_files(plan.settings, out / TILE_FOLDER, t) for t in plan.tiles)
     return [
-        *whole_files(plan, out).values(),
-        *(file for tile in plan.tiles for file in tile_files(plan, out, tile).values()),
+        file
+        for files in (list_requested_files(plan.settings, out), *tiles)
+        for file in files.values()
     ]
-
-
-def whole_files(plan: WorkPlan, out: Path) -> dict[str, Path]:
-    """Return the files of the whole area by format."""
-    return list_requested_files(plan.settings, out)
-
-
-def tile_files(plan: WorkPlan, out: Path, tile: str) -> dict[str, Path]:
-    """Return the files of one work tile's models by format.
-
-    There are none unless the settings ask for them.
-    """
-    return list_requested_tile_files(plan.settings, out / TILE_FOLDER, tile)
 
 
 def write_tile(plan: WorkPlan, state: Path, tile: str, places: Iterable[tuple[str, int]]) -> None:
@@ -109,7 +98,8 @@ def write_tile(plan: WorkPlan, state: Path, tile: str, places: Iterable[tuple[st
 
     That is done where the settings ask for it.
     """
-    if files := tile_files(plan, state.parent, tile):
+    folder = state.parent / TILE_FOLDER
+    if files := list_requested_tile_files(plan.settings, folder, tile):
         join_fragments(files, load_texts(state, places), plan.head)
 
 
@@ -142,14 +132,14 @@ def broken_claims(claims: Iterable[Claim], out: Path) -> list[str]:
 
     Sizes are compared before digests.
     """
+
+    def stands(file: Path, claim: Claim) -> bool:
+        try:
+            return file.stat().st_size == claim.bytes and digest(file) == claim.digest
+        except OSError:
+            return False
+
     return [claim.name for claim in claims if not stands(out / claim.name, claim)]
-
-
-def stands(file: Path, claim: Claim) -> bool:
-    try:
-        return file.stat().st_size == claim.bytes and digest(file) == claim.digest
-    except OSError:
-        return False
 
 
 def digest(file: Path) -> str:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
@@ -16,13 +15,11 @@ from ...errors import InputError, InputWarning
 from ...frames import Units
 from ...log import count_things
 from ...model import PointCloud
+from ...read.points.pointcloud import PointFileHeader, iter_points, read_points
 from ...settings import Settings
 from ..request import Box, Request
 from .classes import choose_classes
 from .work_plan import Job
-
-if TYPE_CHECKING:
-    from ...read.points.pointcloud import PointFileHeader
 
 MOST_BLOCK_M = 250.0
 """Distance (m) from the box of a run beyond which point files are not read for its buildings: no
@@ -96,8 +93,6 @@ def readable_points(clouds: tuple[str, ...], settings: Settings) -> PointCloud:
 
     The step that sorts points names the others.
     """
-    from ...read.points.pointcloud import read_points
-
     try:
         return read_points(*clouds, settings=settings)
     except InputError:
@@ -109,8 +104,6 @@ def readable_points(clouds: tuple[str, ...], settings: Settings) -> PointCloud:
 
 def is_readable(name: str) -> bool:
     """Return whether a point file can be read from end to end."""
-    from ...read.points.pointcloud import iter_points
-
     try:
         for _ in iter_points(name):
             pass

@@ -11,7 +11,7 @@ import dataclasses
 import json
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import shapely
@@ -20,12 +20,12 @@ from pyproj import CRS
 from ...errors import InputError, OutputError, SettingsError
 from ...log import LOGGER, count_things
 from ...masking import masked_values
+from ...read.crs import make_transformer, names_place, parse_crs
 from ...read.outlines.overture import TYPES, OvertureFootprints, is_overture, read_overture
+from ...read.points.pointcloud import PointFileHeader, common_crs
 from ...write.files import atomic
 from ..request import Request
-
-if TYPE_CHECKING:
-    from ...read.points.pointcloud import PointFileHeader
+from .frame import plan_bounds
 
 KEPT_FILE = "overture.gpkg"
 """The file in a run's own folder."""
@@ -92,10 +92,6 @@ def compute_extent(request: Request, headers: list[PointFileHeader]) -> shapely.
 
     Raises InputError where no file names a CRS, and for an extent across the 180th meridian.
     """
-    from ...read.crs import make_transformer, names_place, parse_crs
-    from ...read.points.pointcloud import common_crs
-    from .frame import plan_bounds
-
     read = request.settings.read
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # it is said when the frame is settled

@@ -11,13 +11,17 @@ import json
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ...errors import InputError, InputWarning
 from ...log import count_things
 from ...masking import mask
+from ...model import Footprint
+from ...parametric.fallback import find_fallback_ranges, list_fallback_columns
+from ...parametric.file import HEAD_KEY, objects
+from ...parametric.override import KEYS, RANGES, Override, read_override
 from ...read.models.damage import explain_unreadable
 from ...read.numbers import (
     FIRST_YEAR,
@@ -35,10 +39,6 @@ from ...read.plausible import HIGHEST_BUILDING_M
 from ...settings import ReadSettings
 from ...write.files import save_text
 from .work_plan import Job, WorkPlan
-
-if TYPE_CHECKING:
-    from ...model import Footprint
-    from ...parametric.override import Override
 
 OVERRIDES_FILE, REDO = "overrides.jsonl", "redo.json"
 TABLE_ENDINGS = (".csv", ".gpkg", ".geojson", ".shp", ".fgb", ".xlsx", ".ods")
@@ -61,8 +61,6 @@ def read_overrides(path: str) -> Iterator[tuple[str, dict[str, Any]]]:
 
     Those of a parameters.jsonl are lists of parts.
     """
-    from ...parametric.override import read_override
-
     visited: dict[str, dict[str, Any]] = {}
     for where, record in override_records(path):
         try:
@@ -80,8 +78,6 @@ def read_overrides(path: str) -> Iterator[tuple[str, dict[str, Any]]]:
 
 def override_records(path: str) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield (where, record) of every line or row."""
-    from ...parametric.file import objects
-
     if str(path).lower().endswith(TABLE_ENDINGS):
         yield from (
             (f"row {n} of {path}", record) for n, record in enumerate(table_records(path), 1)
@@ -91,22 +87,13 @@ def override_records(path: str) -> Iterator[tuple[str, dict[str, Any]]]:
         # editors may begin it with a mark of the encoding
         with Path(path).open(encoding="utf-8-sig") as file:
             for number, record in objects(file, path):
-                if not is_other_line(record):
+                # the head and buildings without a model say nothing of how to build
+                if not isinstance(record, dict) or not (
+                    HEAD_KEY in record or ("status" in record and not record.get("parts"))
+                ):
                     yield f"line {number} of {path}", record
     except (OSError, UnicodeDecodeError) as error:
         raise explain_unreadable(path, "overrides (JSONL or a table)", error) from error
-
-
-def is_other_line(record: Any) -> bool:
-    """Return whether a line of a parameters.jsonl is no override.
-
-    Its head and buildings without a model say nothing of how to build.
-    """
-    from ...parametric.file import HEAD_KEY
-
-    return isinstance(record, dict) and (
-        HEAD_KEY in record or ("status" in record and not record.get("parts"))
-    )
 
 
 def table_records(path: str) -> list[dict[str, Any]]:
@@ -176,8 +163,6 @@ def merge_override(of_columns: dict[str, Any], of_file: dict[str, Any], id: str)
     {'leave_out': True, 'z_ground': 2.5}
     """
     if of_columns:
-        from ...parametric.override import read_override
-
         read_override({**of_columns, "id": id})
     combined = dict(of_file)
     for key, value in of_columns.items():
@@ -187,8 +172,6 @@ def merge_override(of_columns: dict[str, Any], of_file: dict[str, Any], id: str)
 
 
 def is_override(record: dict[str, Any]) -> bool:
-    from ...parametric.override import read_override
-
     try:
         read_override(record)
     except InputError:
@@ -204,7 +187,7 @@ def pair_columns(plan: WorkPlan) -> list[tuple[str, str]]:
     Raises InputError for those that are not there.
     """
     pairs = [pair.partition("=")[::2] for pair in plan.settings.read.override_columns]
-    fallbacks = name_fallback_columns(plan.settings.read)
+    fallbacks = list_fallback_columns(plan.settings.read)
     if not plan.jobs or not (pairs or fallbacks):
         return []
     columns = {name for job in plan.jobs if job.footprint for name in job.footprint.attributes}
@@ -214,20 +197,9 @@ def pair_columns(plan: WorkPlan) -> list[tuple[str, str]]:
                 f"expected a column of the footprints ({', '.join(sorted(columns)) or 'none'}) for "
                 f"heights of buildings without points, got {column!r}; name one of these"
             )
-    from ...parametric.override import KEYS
-
     refuse_others([column for column, _ in pairs], sorted(columns), "columns of the footprints")
     refuse_others([key for _, key in pairs], KEYS, "keys of an override")
     return pairs
-
-
-def name_fallback_columns(read: ReadSettings) -> list[str]:
-    """Return the columns that fallback heights come from, if there are any."""
-    if not (read.fallback_roof_height or read.fallback_ground_height):
-        return []
-    from ...parametric.fallback import list_fallback_columns
-
-    return list_fallback_columns(read)
 
 
 def refuse_others(names: list[str], allowed: Sequence[str], subject: str) -> None:
@@ -272,8 +244,6 @@ def load_overrides(state: Path) -> dict[int, Override]:
 
 @functools.lru_cache(maxsize=1)
 def parse_overrides(path: Path, stamp: int) -> dict[int, Override]:
-    from ...parametric.override import read_override
-
     with path.open(encoding="utf-8") as file:
         return {index: read_override(record) for index, record in map(json.loads, file)}
 
@@ -298,11 +268,7 @@ def check_number_columns(footprints: Iterable[Footprint], read: ReadSettings) ->
 
 def list_number_columns(read: ReadSettings) -> list[NumberColumn]:
     """Return the columns of footprints whose numbers the settings name."""
-    ranges = {read.raised_column: (0.0, HIGHEST_BUILDING_M)}
-    if read.fallback_roof_height or read.fallback_ground_height:
-        from ...parametric.fallback import find_fallback_ranges
-
-        ranges |= find_fallback_ranges(read)
+    ranges = {read.raised_column: (0.0, HIGHEST_BUILDING_M), **find_fallback_ranges(read)}
     columns = [
         NumberColumn(
             name,
@@ -344,7 +310,7 @@ def select_possible(record: Mapping[str, Any], id: str, skipped: SkippedValues) 
         if is_possible(key, value):
             result[key] = value
         else:
-            lower, upper = find_range(key) or (0.0, 0.0)
+            lower, upper = RANGES.get(key, (0.0, 0.0))
             skipped.note(f"{key} from {lower:g} to {upper:g}", value, id)
     return result
 
@@ -357,7 +323,7 @@ def convert_value(key: str, value: Any) -> Any:
     """
     if key == "leave_out":
         return YES_OR_NO.get(str(value).strip().lower(), value)
-    if find_range(key) and isinstance(value, str):
+    if key in RANGES and isinstance(value, str):
         number = read_number(value)
         return value if number is None else number
     return str(value) if key == "id" else value
@@ -372,18 +338,8 @@ def is_possible(key: str, value: Any) -> bool:
     ...     [{}]), is_possible("note", -9999)
     (False, False, True, True)
     """
-    bounds = find_range(key)
+    bounds = RANGES.get(key)
     if bounds is None or (key == "parts" and isinstance(value, list)):
         return True
     is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
     return is_number and bounds[0] <= value <= bounds[1]
-
-
-def find_range(key: str) -> tuple[float, float] | None:
-    """Return the least and largest possible value of a key, None without one.
-
-    What checks overrides is imported only for runs that have some.
-    """
-    from ...parametric.override import RANGES
-
-    return RANGES.get(key)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import shapely
@@ -13,12 +13,11 @@ from ...errors import InputWarning
 from ...log import count_things
 from ...model import Footprint
 from ...read.numbers import MOST_SHOWN_VALUES, read_number
+from ...read.outlines.footprints import read_footprints
 from ...read.plausible import HIGHEST_BUILDING_M
 from ..request import Request
+from .frame import AreaFrame
 from .overrides import refuse_missing_column
-
-if TYPE_CHECKING:
-    from .frame import AreaFrame
 
 LEAST_PASSAGE_M2 = 0.5  # of a footprint; less is two layers that do not quite meet
 
@@ -52,8 +51,6 @@ def add_passages(
 
 def read_passages(request: Request, frame: AreaFrame) -> list[tuple[shapely.Polygon, float]]:
     """Read the polygons of passages, with the clearance (m) of each."""
-    from ...read.outlines.footprints import read_footprints
-
     path, column = str(request.underpasses), request.settings.read.clearance_column
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", InputWarning)  # passages may overlap

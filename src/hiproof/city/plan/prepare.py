@@ -4,16 +4,24 @@ from __future__ import annotations
 
 import dataclasses
 import warnings
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import shapely
 
 from ...errors import InputError, InputWarning
+from ...fit.registration import Registration
 from ...frames import Units
 from ...masking import mask
 from ...model import Footprint
-from ...read.crs.positions import format_box
+from ...read.crs import horizontal_crs, names_place, same_horizontal
+from ...read.crs.operations import Operation, find_operation, warn_if_coarse
+from ...read.crs.positions import doubtful_place, format_box, reproject_positions
+from ...read.outlines.database import is_database
+from ...read.outlines.footprints import meets, read_footprints
+from ...read.points.pointcloud import as_input_error, format_others, read_header
+from ...read.terrain import read_terrain
+from ...read.terrain.raster import RasterTerrain
 from ...settings import Settings
 from ...write.naming import FileUnits
 from ...write.reprojected import choose_file_crs
@@ -21,11 +29,14 @@ from ...write.tables.geopackage import attributes_with_a_column
 from ..request import Box, Request
 from .checks import refuse_missing_use
 from .classes import settle_classes
+from .frame import AreaFrame, plan_bounds, settle_frame
 from .from_cloud import Progress, jobs_from_cloud
 from .from_overture import with_overture
 from .outlines import MOST_ROW_M
+from .overlap import check_overlap
 from .overrides import check_number_columns
 from .passages import add_passages
+from .registration import register_footprints
 from .work_plan import (
     VOID_REACH_M,
     Job,
@@ -37,12 +48,6 @@ from .work_plan import (
     unusual_names,
 )
 
-if TYPE_CHECKING:
-    from ...fit.registration import Registration
-    from ...read.crs.operations import Operation
-    from ...read.terrain.raster import RasterTerrain
-    from .frame import AreaFrame
-
 TILE_M = 250.0  # m, side of a work tile: some dozens of houses, so that a core has minutes to do
 MOST_BUILDINGS_A_TILE = 100  # buildings; a killed worker loses one tile
 
@@ -52,9 +57,6 @@ def make_plan(request: Request, progress: Progress = lambda *_: None) -> WorkPla
 
     Raises InputError when nothing can be read.
     """
-    from ...read.terrain import read_terrain
-    from .frame import plan_bounds, settle_frame
-
     headers = read_headers(request.clouds)
     request = with_overture(request, headers)
     frame = settle_frame(request, headers)
@@ -106,8 +108,6 @@ def warn_files_elsewhere(jobs: tuple[Job, ...], crs: Any, units: FileUnits) -> N
 
     That is another place than that of the buildings.
     """
-    from ...read.crs.positions import doubtful_place
-
     boxes = shapely.bounds([job.area for job in jobs])
     corners = units.gml.from_metres(boxes[np.isfinite(boxes).all(axis=1)].reshape(-1, 2))
     doubt = doubtful_place(crs, corners) if len(corners) else None
@@ -168,8 +168,6 @@ def read_headers(clouds: tuple[str, ...]) -> list:
 
     A file that cannot be read does not end the run.
     """
-    from ...read.points.pointcloud import as_input_error, format_others, read_header
-
     headers, errors = [], []
     for name in clouds:
         try:
@@ -198,10 +196,6 @@ def jobs_from_footprints(
     The outlines are those around that were not requested. All are moved by the shift, None where it
     is not looked for.
     """
-    from .frame import plan_bounds
-    from .overlap import check_overlap
-    from .registration import register_footprints
-
     footprints = read_requested_footprints(request, frame, where=request.where, bbox=request.bbox)
     if footprints:
         refuse_missing_use(
@@ -257,9 +251,6 @@ def all_footprints(request: Request, frame: AreaFrame, headers: list) -> tuple[F
 
     What is odd about them has been said of those that are asked for.
     """
-    from ...read.outlines.database import is_database
-    from .frame import plan_bounds
-
     bounds, path = plan_bounds(headers), str(request.footprints)
     box = (
         (*bounds[:, :2].min(axis=0).tolist(), *bounds[:, 2:].max(axis=0).tolist())
@@ -276,8 +267,6 @@ def all_footprints(request: Request, frame: AreaFrame, headers: list) -> tuple[F
 def read_requested_footprints(
     request: Request, frame: AreaFrame, where: str | None, bbox: Box | None
 ) -> tuple[Footprint, ...]:
-    from ...read.outlines.footprints import read_footprints
-
     return read_footprints(
         str(request.footprints),
         request.layer,
@@ -301,10 +290,6 @@ def list_operations(
 
     There is none where both are the same or one is unknown. A warning says where it is coarse.
     """
-    from ...read.crs import horizontal_crs, names_place, same_horizontal
-    from ...read.crs.operations import find_operation, warn_if_coarse
-    from ...read.crs.positions import reproject_positions
-
     boxes = shapely.bounds([job.area for job in jobs])
     boxes = boxes[np.isfinite(boxes).all(axis=1)]
     if (
@@ -346,8 +331,6 @@ def jobs_in_box(jobs: tuple[Job, ...], request: Request, units: Units) -> tuple[
 
     Raises InputError where none does.
     """
-    from ...read.outlines.footprints import meets
-
     if request.bbox is None:
         return jobs
     met = [job for job in jobs if meets(job.area, request.bbox, units)]

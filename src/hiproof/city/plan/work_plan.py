@@ -20,7 +20,7 @@ from ...errors import ErrorReport, InputError, OutputError
 from ...fit.registration import Registration
 from ...frames import Units
 from ...model import Footprint
-from ...read.crs import parse_crs
+from ...read.crs import find_units, parse_crs
 from ...read.crs.operations import Operation
 from ...settings import Settings
 from ...stages.outline import without_needless_vertices
@@ -144,8 +144,6 @@ class WorkPlan:
 
         Everything in between is in metres.
         """
-        from ...read.crs import find_units
-
         return find_units(self.crs(), unit_name=self.settings.read.unit)
 
     def crs(self) -> Any:

@@ -9,9 +9,9 @@ import numpy as np
 import shapely
 
 from ...classify.split import split_buildings
+from ...formats import list_requested_files
 from ...model import Building, PointCloud
 from ...write.run_files import join_fragments
-from ..merge.join import whole_files
 from ..plan.work_plan import WorkPlan
 from .bundles import load_bundle
 from .solve import Surroundings, solve_one
@@ -34,7 +34,7 @@ def solve_bundle(folder: Path, out: Path) -> tuple[Building, str]:
         override,
         keep=lambda job, trace, terrain: traces.append(trace),
     )
-    join_fragments(whole_files(plan, Path(out)), [texts], plan.head)
+    join_fragments(list_requested_files(plan.settings, Path(out)), [texts], plan.head)
     return building, "\n".join(traces)
 
 

@@ -105,7 +105,6 @@ class Reaches:
         members = {tile: [i for i in own_items if has_area[i]] for tile, own_items in tiles.items()}
         self.members = {tile: own_items for tile, own_items in members.items() if own_items}
         self.names = list(self.members)
-        self.place = {tile: number for number, tile in enumerate(self.names)}
         boxes = [
             np.vstack([self.terrain_boxes[own_items], self.roof_boxes[own_items]])
             for own_items in self.members.values()
@@ -115,16 +114,12 @@ class Reaches:
         ).reshape(-1, 4)
         self.tree = shapely.STRtree(shapely.box(*self.bounds.T))
 
-    def near(self, box: Iterable[float]) -> list[str]:
-        """Return names of the tiles whose reach meets a box, in plan order.
+    def near(self, box: Iterable[float]) -> np.ndarray:
+        """Return the tiles (t,) whose reach meets a box, in plan order, as places in `names`.
 
         `box` is (xmin, ymin, xmax, ymax).
         """
-        return [self.names[i] for i in np.sort(self.tree.query(shapely.box(*box)))]
-
-    def compute_bounds(self, tiles: Sequence[str]) -> np.ndarray:
-        """Return boxes (t, 4) of the tiles' reaches."""
-        return self.bounds[[self.place[tile] for tile in tiles]].reshape(-1, 4)
+        return np.sort(self.tree.query(shapely.box(*box)))
 
     def of(self, tile: str) -> Reach:
         members = self.members[tile]
@@ -148,7 +143,8 @@ class Gatherer:
 
     def __init__(self, reaches: Reaches, read: ReadSettings, folder: Path, number: int):
         self.folder, self.number, self.read = folder, number, read
-        self.reach_of, self.near = functools.lru_cache(maxsize=MASKS_KEPT)(reaches.of), reaches.near
+        self.reach_of = functools.lru_cache(maxsize=MASKS_KEPT)(reaches.of)
+        self.names, self.near = reaches.names, reaches.near
         self.low_kinds = (OTHER, ROOF) if read.roofs == "shape" else (OTHER,)
         self.found: dict[str, dict[str, list[np.ndarray]]] = {}
         self.classes: Counter[int] = Counter()
@@ -161,7 +157,7 @@ class Gatherer:
         self.classes.update({int(c): int(n) for c, n in enumerate(np.bincount(classes)) if n})
         kinds = self.classify_las_classes()[classes]
         grid = PointGrid(cloud.xyz, SQUARE_M)
-        for tile in self.near(grid.bounds):
+        for tile in map(self.names.__getitem__, self.near(grid.bounds)):
             reach = self.reach_of(tile)
             candidates = grid.candidates(reach.bounds)
             bits = reach.bits(cloud.xyz, candidates)
@@ -272,7 +268,7 @@ def wanted_points(
     box = units.to_metres(np.array([[west, south], [east, north]], float)).ravel()
     if is_whole:
         return iter_points(path, units=units, noted=None if is_copc(path) else result)
-    if reaches.is_partial and np.isfinite(box).all() and not reaches.near(box):
+    if reaches.is_partial and np.isfinite(box).all() and not len(reaches.near(box)):
         return iter(())
     if is_copc(path):
         return points_by_squares(path, reaches, units)
@@ -295,7 +291,7 @@ def points_by_squares(path: str, reaches: Reaches, units: Units) -> Iterator[Poi
     (xmin, ymin), (xmax, ymax) = units.to_metres(
         np.reshape(read_header(path).bounds, (2, 3))[:, :2]
     )
-    bounds = reaches.compute_bounds(reaches.near((xmin, ymin, xmax, ymax)))
+    bounds = reaches.bounds[reaches.near((xmin, ymin, xmax, ymax))]
     corners = np.floor(
         np.clip(bounds, (xmin, ymin, xmin, ymin), (xmax, ymax, xmax, ymax)) / QUERY_M
     ).astype(np.int64)
@@ -307,7 +303,7 @@ def points_by_squares(path: str, reaches: Reaches, units: Units) -> Iterator[Poi
     }
     for column, row in sorted(columns_and_rows):
         square = QUERY_M * np.array([column, row, column + 1, row + 1])
-        nearby = reaches.compute_bounds(reaches.near(square))
+        nearby = reaches.bounds[reaches.near(square)]
         if len(nearby):
             lower, upper = nearby[:, :2].min(axis=0), nearby[:, 2:].max(axis=0)
             box = (*np.maximum(square[:2], lower), *np.minimum(square[2:], upper))
