@@ -13,14 +13,13 @@ from hiproof.settings import ReadSettings
 from hiproof.simulate import random_building
 from hiproof.simulate.roofs import assemble, make_part
 from hiproof.status import Change, ChangeKind
-from hiproof.update.cells import SurveyNoise
 from hiproof.update.clusters import compute_chance
 from hiproof.update.ground import Ground
 from hiproof.update.judge import judge_building
 from hiproof.update.kinds import name_differences
-from hiproof.update.register import SampledRoof, register_surveys
+from hiproof.update.register import SampledRoof, SurveyShift, register_surveys
 
-NOISE, GROUND = SurveyNoise(), Ground(np.zeros(3), 0.0, 0.0)
+SHIFT, GROUND = SurveyShift(sigma=(0.4, 0.4, 0.01)), Ground(np.zeros(3), 0.0, 0.0)
 FLAT = {"length": 16.0, "width": 10.0}
 GABLE = {"length": 14.0, "width": 9.0, "height": 3.5}
 
@@ -43,7 +42,7 @@ def make_roof(kind="gable", parameters=None, eave=6.0):
 
 def judge(old, new, significance=0.001, **options):
     roof, points = old
-    return judge_building(roof, points, new, GROUND, NOISE, 0.01, significance, **options)
+    return judge_building(roof, points, new, GROUND, SHIFT, significance, **options)
 
 
 @pytest.fixture

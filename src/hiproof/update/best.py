@@ -89,8 +89,7 @@ def is_same(
         roof.frame.to_local(old),
         roof.frame.to_local(new),
         Ground.under(building, roof.frame),
-        shift.noise,
-        shift.sigma[2],
+        shift,
         SIGNIFICANCE,
     )
     return verdict.change is Change.UNCHANGED

@@ -14,9 +14,10 @@ import numpy as np
 
 from ..model import Roof
 from ..status import Change
-from .cells import CellComparison, SurveyNoise, compare_points, predict_occupancy
+from .cells import CellComparison, compare_points, predict_occupancy
 from .clusters import ChangedCells, find_clusters
 from .ground import Ground
+from .register import SurveyShift
 
 COVERED = 0.5
 """Share of a building that the new survey has to cover, for the building to be judged."""
@@ -60,23 +61,22 @@ def judge_building(
     old: np.ndarray | None,
     new: np.ndarray,
     ground: Ground,
-    noise: SurveyNoise,
-    sigma_m: float,
+    shift: SurveyShift,
     significance: float,
     unexplained_m2: float = 0.0,
 ) -> ChangeVerdict:
     """Judge a building by its `old` and `new` points (n, 3), in its roof's frame.
 
-    Ground points inside the outline are among them, `ground` is the earlier one, and `sigma_m` the
-    standard deviation of the common vertical shift. Without old points clusters count
-    as far as they are larger than the area that the earlier model left unexplained.
+    Ground points inside the outline are among them, `ground` is the earlier one, and `shift` that
+    of the new points, which is taken off. Without old points clusters count as far as they are
+    larger than the area that the earlier model left unexplained.
     """
-    comparison = compare_points(roof, old, new, noise)
+    comparison = compare_points(roof, old, new, shift.noise)
     if is_not_covered(comparison, roof):
         return ChangeVerdict(Change.NOT_COVERED, comparison, ground)
     if is_gone(comparison, roof, ground):
         return ChangeVerdict(Change.GONE, comparison, ground, 0.0)
-    found = [c for c in find_clusters(comparison, noise.stray) if c.area_m2 >= SMALLEST_M2]
+    found = [c for c in find_clusters(comparison, shift.noise.stray) if c.area_m2 >= SMALLEST_M2]
     likely = [c for c in found if c.chance < significance]
     beyond = unexplained_m2 if old is None else 0.0
     clear = tuple(
@@ -84,7 +84,7 @@ def judge_building(
         for c in likely
         if (c.is_surface or lies_bare(c, comparison, ground)) and c.area_m2 > beyond
     )
-    chance = min([compute_whole_chance(comparison, noise, sigma_m), *(c.chance for c in clear)])
+    chance = min([compute_whole_chance(comparison, shift), *(c.chance for c in clear)])
     if clear or chance < significance:
         return ChangeVerdict(Change.CHANGED, comparison, ground, chance, clear)
     doubtful = tuple(c for c in likely if c.area_m2 >= DOUBTFUL_M2)
@@ -133,13 +133,14 @@ def find_heights(roof: Roof, comparison: CellComparison) -> np.ndarray:
     return np.where(np.isfinite(heights), heights, lowest)
 
 
-def compute_whole_chance(comparison: CellComparison, noise: SurveyNoise, sigma_m: float) -> float:
+def compute_whole_chance(comparison: CellComparison, shift: SurveyShift) -> float:
     """Return the chance that the whole roof lies higher or lower by so much.
 
     It is 1 where not most cells take part in that.
     """
     d, s = (v[comparison.is_compared] for v in (comparison.difference, comparison.sigma))
     middle = float(np.median(d))
-    sigma = math.sqrt(noise.roof**2 + sigma_m**2 + 1.57 * float(np.mean(s**2)) / len(d))
+    sampling = 1.57 * float(np.mean(s**2)) / len(d)
+    sigma = math.sqrt(shift.noise.roof**2 + shift.sigma[2] ** 2 + sampling)
     together = np.mean(np.abs(d - middle) < np.abs(d))
     return 1.0 if together < WHOLE_SHARE else math.erfc(abs(middle) / sigma / math.sqrt(2))

@@ -68,8 +68,7 @@ def move_building(
         old,
         points[1],
         verdict.ground,
-        surveys.shift.noise,
-        surveys.shift.sigma[2],
+        surveys.shift,
         surveys.largest_chance,
     )
     return result if again.change is Change.UNCHANGED else None
@@ -114,11 +113,8 @@ def lift_points(roof: Roof, points: np.ndarray, lifts: np.ndarray) -> np.ndarray
 
 def measure_moved(moved: Building, points: np.ndarray) -> Building:
     """Return a moved building measured on the new roof `points` (n, 3) in the world."""
-    local = select_inside(moved.roof, points)
-    measured = measure_building(moved, local)
-    density = len(local) / moved.roof.outline.area
-    quality = dataclasses.replace(measured.quality, points=len(local), density=density)
-    return dataclasses.replace(moved, quality=quality, grade=measured.grade)
+    measured = measure_building(moved, select_inside(moved.roof, points))
+    return dataclasses.replace(moved, quality=measured.quality, grade=measured.grade)
 
 
 LEFT_SHARE = 0.25

@@ -159,10 +159,7 @@ class SurveyShift:
     @staticmethod
     def from_dict(record: dict[str, Any]) -> SurveyShift:
         """Read what `to_dict` gave."""
-        names = [item.name for item in dataclasses.fields(SurveyShift)]
-        values = {name: record[name] for name in names}
-        for name in ("xyz", "sigma"):
-            values[name] = tuple(values[name])
+        values = {name: value for name, value in record.items() if name != "applied"}
         return SurveyShift(**values | {"noise": SurveyNoise(**values["noise"])})
 
     def refuse_other_heights(self, name: str) -> None:

@@ -169,15 +169,14 @@ class Updater:
         if roof is None or earlier.status is Status.FROM_ATTRIBUTES:
             return None
         old, new = self.epochs.select(job, record)
-        frame, shift = roof.frame, self.surveys.shift
+        frame = roof.frame
         unexplained = earlier.quality.unexplained_area_m2
         return judge_building(
             roof,
             None if old is None else frame.to_local(old),
             frame.to_local(new),
             Ground.under(earlier, frame),
-            shift.noise,
-            shift.sigma[2],
+            self.surveys.shift,
             self.surveys.largest_chance,
             0.0 if math.isnan(unexplained) else unexplained,
         )
