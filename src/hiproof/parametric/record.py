@@ -283,6 +283,8 @@ def require_values(record: Any, table: str, label: str) -> Mapping[str, Any]:
 
 def refuse_other_types(record: Mapping[str, Any], table: str, label: str = "") -> None:
     """Raise InputError where values are not of the types that the table declares for them."""
+    if table == "roof_outside":
+        number(record.get("area"), f"area of {label}")
     for attribute in TABLES[table].attributes:
         name, type, value = attribute.name, attribute.type, record.get(attribute.name)
         if attribute.kind == "text":
@@ -306,8 +308,6 @@ def refuse_other_types(record: Mapping[str, Any], table: str, label: str = "") -
                 place(value, name, coordinate)
             elif type == "polygon?":
                 polygon(value, name)
-    if table == "roof_outside":
-        number(record.get("area"), f"area of {label}")
     if table == "change_place" and len(list_at(record, "parts")) not in (0, 2):
         raise InputError(
             f"expected the earlier and the new part of {label}, got {excerpt(record['parts'])}; "
