@@ -7,6 +7,7 @@ another process.
 """
 
 import traceback
+import warnings
 from pathlib import Path
 from typing import NamedTuple
 
@@ -102,6 +103,11 @@ class HiproofWarning(UserWarning):
 
 class InputWarning(HiproofWarning):
     """Input that was used after a correction, such as points dropped; says what and how much."""
+
+
+def warn(source: object, text: str) -> None:
+    """Warn (InputWarning) of what was found in a `source`, a file or what else was read."""
+    warnings.warn(f"{source}: {text}", InputWarning, stacklevel=2)
 
 
 class OutputWarning(HiproofWarning):

@@ -43,22 +43,9 @@ def reconstruct(
     """
     from .running import run_request
 
-    if log_file is not None:
-        from ..write.files import refuse_overwriting, refuse_run_file
-
-        given = [*(clouds or ()), footprints, terrain, overrides, underpasses, config]
-        refuse_overwriting([log_file], given)
-        refuse_run_file(log_file)
-    start(console_level(), log_file)
+    start_log(log_file, [*(clouds or ()), footprints, terrain, overrides, underpasses, config])
     box = None if bbox is None else parse_box(bbox)
-    if not enrich and "enrich" in (changes or {}):
-        raise SettingsError("expected --enrich with options of `hiproof enrich`, got none; add it")
-
-    if not epoch and "shift" in (changes or {}).get("read", {}):
-        raise SettingsError(
-            "expected surveys (--epoch) with --shift, which puts one on another, got none; name "
-            "each with --epoch DATE=CLOUD, or leave out --shift"
-        )
+    refuse_lone_options(epoch, enrich, changes or {})
 
     @functools.cache
     def read_settings() -> Settings:
@@ -100,6 +87,29 @@ def reconstruct(
         answers = with_terrain(answers, terrain if answers.sun else None)
         code = enrich_folder(out, None, answers, jobs) or code
     return code
+
+
+def start_log(log_file: Path | None, given: list[Any]) -> None:
+    """Start the log; raises OutputError where its file is one of those `given`, or a run's."""
+    if log_file is not None:
+        from ..write.files import refuse_overwriting, refuse_run_file
+
+        refuse_overwriting([log_file], given)
+        refuse_run_file(log_file)
+    start(console_level(), log_file)
+
+
+def refuse_lone_options(
+    epoch: list[str] | None, enrich: bool, changes: dict[str, dict[str, Any]]
+) -> None:
+    """Raise SettingsError for options that mean something beside others alone."""
+    if not enrich and "enrich" in changes:
+        raise SettingsError("expected --enrich with options of `hiproof enrich`, got none; add it")
+    if not epoch and "shift" in changes.get("read", {}):
+        raise SettingsError(
+            "expected surveys (--epoch) with --shift, which puts one on another, got none; name "
+            "each with --epoch DATE=CLOUD, or leave out --shift"
+        )
 
 
 def refuse_before(settings: Settings) -> None:

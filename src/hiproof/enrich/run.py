@@ -12,7 +12,6 @@ import functools
 import hashlib
 import json
 import shutil
-import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -23,7 +22,7 @@ from .. import __version__
 from ..city.plan.checks import refuse_missing_use
 from ..city.work.cores import as_many_as_pay
 from ..city.work.executors import make_executor
-from ..errors import HiproofError, InputError, InputWarning, OutputError, report_error
+from ..errors import HiproofError, InputError, OutputError, report_error, warn
 from ..evaluate.run import list_run_inputs, run_record
 from ..formats import FORMATS, list_requested_files, requested_fragments
 from ..log import LOGGER
@@ -210,10 +209,10 @@ def warn_without_residential(uses: np.ndarray, name: str) -> None:
     """Warn where none of the `uses` (n,) is a dwelling's, as where they are codes."""
     named = [str(use) for use in uses if use]
     if named and not any(map(is_residential, named)):
-        warnings.warn(
-            f"{name}: expected words such as residential, Wohnhaus or woonfunctie, got none, but "
+        warn(
+            name,
+            f"expected words such as residential, Wohnhaus or woonfunctie, got none, but "
             f"{named[0]:.40}; buildings with a use get no house type, and storeys as in offices",
-            InputWarning,
         )
 
 

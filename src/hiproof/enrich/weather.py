@@ -11,14 +11,13 @@ from __future__ import annotations
 import functools
 import io
 import re
-import warnings
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import InputError, InputWarning
+from ..errors import InputError, warn
 from ..extras import import_extra
 from ..log import count_things
 
@@ -213,8 +212,6 @@ def refuse_other_sun(weather: Weather, path: str) -> None:
     gaps, excess = np.abs(ghi - dhi - dni * rise), np.maximum(ghi - ceiling * rise, 0.0)
     share = total / float((ceiling * rise).sum())
     days, noons = ghi.reshape(-1, 24).sum(axis=1), rise.reshape(-1, 24).max(axis=1)
-    is_high = rise > DAYLIGHT_RISE
-    brightness = float(np.quantile((ghi / ceiling)[is_high] / rise[is_high], BRIGHTEST))
     is_dark = (days == 0.0) & (noons > DAYLIGHT_RISE)
     worst = int(np.maximum(np.maximum(gaps, excess), np.maximum(dni - ceiling, 0.0)).argmax())
     if excess.sum() > GREATEST_EXCESS * total or excess[worst] > GREATEST_GAP_WM2:
@@ -241,19 +238,26 @@ def refuse_other_sun(weather: Weather, path: str) -> None:
             f"expected radiation in {path} that fits the sun over its station, got {got}; use "
             "another file"
         )
-    doubt = ""
-    if dhi.sum() > (1 - LEAST_DIRECT) * total:
-        doubt = (
-            "hardly any direct radiation in a year, which no climate has, so slopes that face the "
-            "sun get too little; use a file with direct radiation"
+    is_high = rise > DAYLIGHT_RISE
+    brightness = float(np.quantile((ghi / ceiling)[is_high] / rise[is_high], BRIGHTEST))
+    warn_of_dull_sun(path, float(dhi.sum()) / total, brightness)
+
+
+def warn_of_dull_sun(path: str, diffuse_share: float, brightness: float) -> None:
+    """Warn of a year without direct radiation, or without clear hours."""
+    if diffuse_share > 1 - LEAST_DIRECT:
+        warn(
+            path,
+            "has hardly any direct radiation in a year, which no climate has, so slopes that face "
+            "the sun get too little; use a file with direct radiation",
         )
     elif brightness < LEAST_BRIGHTNESS:
-        doubt = (
-            f"no clear hours; the brightest have {brightness:.0%} of what reaches the atmosphere, "
-            "and 70 % are usual, so all sun may be too low; check that the unit is W/m2"
+        warn(
+            path,
+            f"has no clear hours; the brightest have {brightness:.0%} of what reaches the "
+            "atmosphere, and 70 % are usual, so all sun may be too low; check that the unit is "
+            "W/m2",
         )
-    if doubt:
-        warnings.warn(f"{path}: has {doubt}", InputWarning)
 
 
 def measure_rise(weather: Weather) -> np.ndarray:

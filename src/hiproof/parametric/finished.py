@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import os
-import warnings
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -14,7 +13,7 @@ from typing import Any
 import numpy as np
 import shapely
 
-from ..errors import HiproofError, InputError, InputWarning
+from ..errors import HiproofError, InputError, warn
 from ..evaluate.metrics import plan_outline
 from ..evaluate.models import BuildingModel, read_models, run_models
 from ..evaluate.run import run_crs, run_record
@@ -145,10 +144,10 @@ def describe_solids(path: Path, head: FileHead, damaged: Damaged) -> Iterator[Sh
             continue
         yield Sheet(building, figures, building.attributes, head)
     if repeats := known.total() - len(known):
-        warnings.warn(
-            f"{mask(str(path))}: {count_things(repeats, 'building')} with an id given before; "
+        warn(
+            mask(str(path)),
+            f"{count_things(repeats, 'building')} with an id given before; "
             "if it was joined of files that overlap, keep one of each",
-            InputWarning,
         )
 
 

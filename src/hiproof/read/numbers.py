@@ -9,12 +9,11 @@ from __future__ import annotations
 
 import math
 import re
-import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from ..errors import InputWarning
+from ..errors import warn
 from .names import READING
 
 # Metres of the units of length that may follow a number.
@@ -56,10 +55,9 @@ class SkippedValues:
             subset = ", ".join(values[:MOST_SHOWN_VALUES]) + (
                 ", ..." if len(values) > MOST_SHOWN_VALUES else ""
             )
-            warnings.warn(
-                f"{self.source}: expected {expected}, left out {len(values)} of its values: "
-                f"{subset}",
-                InputWarning,
+            warn(
+                self.source,
+                f"expected {expected}, left out {len(values)} of its values: {subset}",
             )
 
 

@@ -9,7 +9,6 @@ one run of numbers.
 from __future__ import annotations
 
 import csv
-import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -18,7 +17,7 @@ from pathlib import Path
 import numpy as np
 import shapely
 
-from ..errors import InputError, InputWarning
+from ..errors import InputError, warn
 from ..log import count_things
 
 # Our catalogue's name of each RoofN3D class.
@@ -65,10 +64,7 @@ def read_roofn3d(path: str | Path) -> Iterator[RoofN3DRecord]:
             row["id"], ROOFN3D_TYPES.get(class_name.lower()), class_name, points, outline
         )
     if repeated:
-        warnings.warn(
-            f"{path}: {count_things(repeated, 'row')} with the id of an earlier one left out",
-            InputWarning,
-        )
+        warn(path, f"{count_things(repeated, 'row')} with the id of an earlier one left out")
 
 
 def read_roofn3d_labels(

@@ -12,7 +12,7 @@ import numpy as np
 from pyproj import CRS, Proj, Transformer
 from pyproj.exceptions import CRSError, ProjError
 
-from ...errors import InputError, InputWarning
+from ...errors import InputError, warn
 from ...frames import METRES, Units
 from ..names import READING
 from .axes import check_height_axis, check_plan_axes
@@ -86,10 +86,10 @@ def read_named_crs(name: Any, path: Any) -> CRS | None:
     try:
         return parse_crs(name)
     except InputError:
-        warnings.warn(
-            f"{path}: names a CRS that PROJ does not know, {str(name)[:60]!r}; it is taken as a "
+        warn(
+            path,
+            f"names a CRS that PROJ does not know, {str(name)[:60]!r}; it is taken as a "
             "file that names none. Name another in the file, or with --crs",
-            InputWarning,
         )
         return None
 

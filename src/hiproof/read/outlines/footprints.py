@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,7 +10,7 @@ import numpy as np
 import shapely
 from pyproj import CRS
 
-from ...errors import InputError, InputWarning
+from ...errors import InputError, warn
 from ...frames import Units
 from ...geometry.rings import clockwise
 from ...log import count_things
@@ -253,10 +252,9 @@ def feature_ids(
         ids = [id_text(row.get(name)) for row in rows]
         missing = ids.count("")
         if missing:
-            warnings.warn(
-                f"{path}: {count_things(missing, 'feature')} without {name}; the number stands in "
-                "for it",
-                InputWarning,
+            warn(
+                path,
+                f"{count_things(missing, 'feature')} without {name}; the number stands in for it",
             )
         return [id or number for id, number in zip(ids, by_number, strict=True)]
     usual = [names[name] for name in ID_NAMES if name in names]
@@ -265,10 +263,10 @@ def feature_ids(
         if all(ids) and len(set(ids)) == len(ids):
             return ids
     if usual:
-        warnings.warn(
-            f"{path}: {usual[0]} repeats or is missing, so buildings go by their number; "
+        warn(
+            path,
+            f"{usual[0]} repeats or is missing, so buildings go by their number; "
             f"--id-attribute {usual[0]} takes it all the same",
-            InputWarning,
         )
     return by_number
 
@@ -292,10 +290,7 @@ def transform_geometries(
             shapely.bounds(geometries), f"the footprints of {path}, which names {text},", advice
         )
     if source is None and target is not None:
-        warnings.warn(
-            f"{path}: names no CRS; taken to be in the cloud's, {describe_crs(target)}",
-            InputWarning,
-        )
+        warn(path, f"names no CRS; taken to be in the cloud's, {describe_crs(target)}")
     if source is None or target is None or same_horizontal(source, target):
         return geometries
     if not names_place(source):
@@ -303,7 +298,7 @@ def transform_geometries(
             f"names a local CRS, {describe_crs(source)}; taken to be in the cloud's, "
             f"{describe_crs(target)}"
         )
-        warnings.warn(f"{path}: {accepted}", InputWarning)
+        warn(path, accepted)
         return shapely.transform(geometries, lambda xy: xy * compare_units(source, target))
     transformer = make_transformer(source, target)
     warn_if_coarse(find_operation(str(path), source, target, find_middle(geometries)))
@@ -368,22 +363,17 @@ def split_features(
             ]
     if split:
         many = count_things(len(split), "feature") + " of several polygons"
-        warnings.warn(
-            f"{path}: {many} became {sum(split)} buildings, named by its id and -1, -2, ...",
-            InputWarning,
-        )
+        warn(path, f"{many} became {sum(split)} buildings, named by its id and -1, -2, ...")
     if surfaces.any():
         bodies = count_things(int(surfaces.sum()), "feature") + " of faces in space"
-        warnings.warn(
-            f"{path}: {bodies}; the area that they cover from above is the outline", InputWarning
-        )
+        warn(path, f"{bodies}; the area that they cover from above is the outline")
     if mended:
-        warnings.warn(f"{path}: {count_things(mended, 'invalid footprint')} repaired", InputWarning)
+        warn(path, f"{count_things(mended, 'invalid footprint')} repaired")
     if empty:
-        warnings.warn(
-            f"{path}: {count_things(empty, 'feature')} with no area that a building could have; "
+        warn(
+            path,
+            f"{count_things(empty, 'feature')} with no area that a building could have; "
             "such get no model, but a status",
-            InputWarning,
         )
     return footprints
 
@@ -406,16 +396,16 @@ def unique_ids(footprints: Sequence[Footprint], path: str | Path) -> list[Footpr
             attributes, copies = {**attributes, "copy_of": result[originals[number]].id}, copies + 1
         result.append(Footprint(id, footprint.polygon, attributes))
     if renamed:
-        warnings.warn(
-            f"{path}: {count_things(renamed, 'footprint')} with the id of an earlier one got a "
+        warn(
+            path,
+            f"{count_things(renamed, 'footprint')} with the id of an earlier one got a "
             "suffix such as _2",
-            InputWarning,
         )
     if copies:
-        warnings.warn(
-            f"{path}: {count_things(copies, 'footprint')} with the polygon of another; see the "
+        warn(
+            path,
+            f"{count_things(copies, 'footprint')} with the polygon of another; see the "
             "attribute copy_of",
-            InputWarning,
         )
     return result
 
@@ -451,9 +441,9 @@ def warn_overlaps(footprints: Sequence[Footprint], path: str | Path) -> None:
         smaller, larger = np.take_along_axis(
             pairs, np.argsort(shapely.area(polygons[pairs]), axis=0), axis=0
         )
-        warnings.warn(
-            f"{path}: {count_things(len(np.unique(smaller)), 'footprint')} on top of a larger one "
-            f"({footprints[smaller[0]].id} on {footprints[larger[0]].id}): models of both have the "
-            "same points and overlap; keep one of them",
-            InputWarning,
+        warn(
+            path,
+            f"{count_things(len(np.unique(smaller)), 'footprint')} on top of a larger one "
+            f"({footprints[smaller[0]].id} on {footprints[larger[0]].id}): models of both have "
+            "the same points and overlap; keep one of them",
         )

@@ -16,7 +16,7 @@ import pyogrio
 from pyogrio.errors import DataLayerError, DataSourceError, FeatureError, FieldError, GeometryError
 from pyogrio.util import vsi_path
 
-from ...errors import InputError, InputWarning
+from ...errors import InputError, warn
 from .attribute_columns import make_known_condition, restore_declared_types
 from .polygons import decode_geometries
 
@@ -171,10 +171,7 @@ def read_vector_file(
         meta, numbers, wkb, columns, as_text = read_layer(source, layer, **selection)
     if as_text:
         names = ", ".join(as_text)
-        warnings.warn(
-            f"{path}: read as text, for a value does not fit the attribute's type: {names}",
-            InputWarning,
-        )
+        warn(path, f"read as text, for a value does not fit the attribute's type: {names}")
     if wkb is None:
         raise InputError(
             f"expected polygons in {path}, got a table without geometry; name another file or layer"

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import functools
 import struct
-import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -21,7 +20,7 @@ import lazrs
 import numpy as np
 from laspy import DecompressionSelection, LazBackend
 
-from ...errors import InputError, InputWarning
+from ...errors import InputError, warn
 from ...log import count_things
 from ..plausible import Implausible
 from ..remote import is_url, open_binary
@@ -226,6 +225,4 @@ def copc_chunk(path: str | Path, box: tuple[float, float, float, float]) -> Chun
 def log_withheld(count: int, path: str | Path) -> None:
     """Log once, not by the chunk, how many points of a file were withheld."""
     if count:
-        warnings.warn(
-            f"{path}: {count_things(count, 'point')} flagged as withheld left out", InputWarning
-        )
+        warn(path, f"{count_things(count, 'point')} flagged as withheld left out")

@@ -13,12 +13,11 @@ lasinterval (rapidlasso, open source).
 
 from __future__ import annotations
 
-import warnings
 from pathlib import Path
 
 import numpy as np
 
-from ...errors import InputWarning
+from ...errors import warn
 from ..remote import is_url
 from .las import read_checked_facts
 from .runs import RunIndex
@@ -43,10 +42,7 @@ def read_lax(path: str | Path) -> RunIndex | None:
         if indexed_points != points or index.runs.max(initial=0) > points:
             raise ValueError(f"it tells of {indexed_points} points, the file has {points}")
     except (ValueError, IndexError, OSError) as error:
-        warnings.warn(
-            f"{lax_path}: is left aside as an index of {path} ({error}); make it again",
-            InputWarning,
-        )
+        warn(lax_path, f"is left aside as an index of {path} ({error}); make it again")
         return None
     return index
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import glob
-import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +11,7 @@ from urllib.parse import urlsplit
 
 import numpy as np
 
-from ...errors import InputError, InputWarning
+from ...errors import InputError, warn
 from ...frames import METRES, Units
 from ...log import count_things
 from ...model import PointCloud
@@ -180,10 +179,7 @@ def plausible_chunks(chunks: Iterator[las.Chunk], path: str | Path) -> Iterator[
             xyz, classes = select_classes(xyz, classes, keep)
         yield xyz, classes
     if dropped:
-        warnings.warn(
-            f"{path}: {count_things(dropped, 'point')} with NaN or infinite coordinates left out",
-            InputWarning,
-        )
+        warn(path, f"{count_things(dropped, 'point')} with NaN or infinite coordinates left out")
 
 
 def as_input_error(error: Exception, path: str | Path) -> InputError:
@@ -275,10 +271,10 @@ def warn_coarse(headers: list[PointFileHeader], units: Units) -> None:
             coarse[header.path] = " and ".join(phrases)
     if coarse:
         path, steps = next(iter(coarse.items()))
-        warnings.warn(
-            f"{path}{format_others(list(coarse))}: coordinates come in steps of {steps}, and roofs "
+        warn(
+            f"{path}{format_others(list(coarse))}",
+            f"coordinates come in steps of {steps}, and roofs "
             "are no finer; write the file anew from its source with steps of 0.01 m or less",
-            InputWarning,
         )
 
 
@@ -331,9 +327,7 @@ def drop_other_text(files: list[Path]) -> list[str | Path]:
         return list(files)
     if len(points) < len(files):
         remainder = ", ".join(file.name for file in files if file not in points)
-        warnings.warn(
-            f"{files[0].parent}: text without points is left aside: {remainder}", InputWarning
-        )
+        warn(files[0].parent, f"text without points is left aside: {remainder}")
     return list(points)
 
 
@@ -391,10 +385,10 @@ def common_crs(crs_of: dict[str, Any], arguments: Any = None, unit: str = "auto"
     if arguments is not None:
         overruled = [path for path, crs in named_crs.items() if not same_horizontal(crs, arguments)]
         if overruled:
-            warnings.warn(
-                f"{overruled[0]}{format_others(overruled)}: taken in {describe_crs(arguments)}, as "
+            warn(
+                f"{overruled[0]}{format_others(overruled)}",
+                f"taken in {describe_crs(arguments)}, as "
                 f"told, although its header names {describe_crs(named_crs[overruled[0]])}",
-                InputWarning,
             )
         return arguments
     first = next(iter(named_crs), "")
@@ -402,10 +396,9 @@ def common_crs(crs_of: dict[str, Any], arguments: Any = None, unit: str = "auto"
         refuse_two(named_crs[first], first, crs, path)
     unnamed = [path for path in crs_of if path not in named_crs]
     if named_crs and unnamed:
-        warnings.warn(
-            f"{unnamed[0]}{format_others(unnamed)}: names no CRS; taken in "
-            f"{describe_crs(named_crs[first])} as {first} is",
-            InputWarning,
+        warn(
+            f"{unnamed[0]}{format_others(unnamed)}",
+            f"names no CRS; taken in {describe_crs(named_crs[first])} as {first} is",
         )
     return max(named_crs.values(), key=lambda crs: vertical_crs(crs) is not None, default=None)
 

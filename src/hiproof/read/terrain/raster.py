@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from pyproj import CRS
 
-from ...errors import DamagedRaster, InputError, InputWarning
+from ...errors import DamagedRaster, InputError, warn
 from ...extras import import_extra
 from ...frames import Units
 from ...geometry.grid import number_cells
@@ -142,10 +142,7 @@ class RasterTerrain:
             return 1.0
         units = find_units(own_crs, f"the terrain model {self.path}")
         if vertical_crs(own_crs) is None and not units.are_metres:
-            warnings.warn(
-                f"{self.path}: names no unit of its heights; taken as {units.height_name}",
-                InputWarning,
-            )
+            warn(self.path, f"names no unit of its heights; taken as {units.height_name}")
         return units.height
 
     @property

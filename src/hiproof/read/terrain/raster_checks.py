@@ -9,11 +9,10 @@ from __future__ import annotations
 
 import math
 import re
-import warnings
 from collections.abc import Iterator
 from typing import Any
 
-from ...errors import InputError, InputWarning
+from ...errors import InputError, warn
 from ..names import READING
 
 METRES_IN: dict[str, float] = {
@@ -69,9 +68,7 @@ def height_band(dataset: Any, path: str) -> int:
             f"expected a raster of heights at {path}, got {text}; name a terrain model"
         )
     if len(bands) > 1:
-        warnings.warn(
-            f"{path}: has {len(bands)} bands; the heights are taken from band {band}", InputWarning
-        )
+        warn(path, f"has {len(bands)} bands; the heights are taken from band {band}")
     return band
 
 
