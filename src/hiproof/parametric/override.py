@@ -128,6 +128,8 @@ def read_override(record: Mapping[str, Any]) -> Override:
             "parts"
         )
     types = read_types(record, text)
+    if "outline" in record:
+        polygon(record["outline"], f"outline of {text}")
     return Override(
         id=id,
         type=record.get("type"),
@@ -135,9 +137,7 @@ def read_override(record: Mapping[str, Any]) -> Override:
         most_parts=None if count is None else int(count),
         parts=record["parts"] if has_list else None,
         origin=place(record["origin"], f"origin of {text}") if "origin" in record else None,
-        outline=record["outline"]
-        if "outline" in record and polygon(record["outline"], f"outline of {text}")
-        else None,
+        outline=record.get("outline"),
         fixed=fixed,
         z_ground=possible(record, "z_ground", text),
         block_height=possible(record, "block_height", text),

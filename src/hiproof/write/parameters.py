@@ -229,8 +229,8 @@ def places(xyz: np.ndarray) -> list[list[float | None]]:
     return (np.round(xyz, LENGTH_DIGITS) + 0.0).tolist()
 
 
-def numbers(values: Iterable[float], digits: int = LENGTH_DIGITS) -> list[float | None]:
-    return [number(value, digits) for value in values]
+def numbers(values: Iterable[float]) -> list[float | None]:
+    return [number(value) for value in values]
 
 
 # How values of a type are written; all others are as they are.

@@ -116,7 +116,8 @@ def make_reprojection(crs: Any, out: Any, source_units: Units, units: Units) -> 
     none, of heights without a grid that is at hand.
     """
     crs, out = parse_crs(crs), parse_crs(out)
-    heights = has_heights(out) and not same_height_system(crs, out)
+    own, theirs = vertical_crs(crs), vertical_crs(out)
+    heights = has_heights(out) and not (own and theirs and own.equals(theirs))
     if same_horizontal(crs, out) and not heights:
         return units
     plan = find_best_transformer(horizontal_crs(crs), horizontal_crs(out), allow_ballpark=False)
@@ -150,9 +151,3 @@ def height_way(crs: Any, out: Any) -> Any:
             "stay as they are"
         )
     return way
-
-
-def same_height_system(crs: Any, out: Any) -> bool:
-    """Return whether both have the same level and unit of heights."""
-    own_names, theirs = vertical_crs(crs), vertical_crs(out)
-    return own_names is not None and theirs is not None and own_names.equals(theirs)

@@ -306,9 +306,15 @@ def transform_geometries(
         geometries, lambda xy: np.column_stack(transformer.transform(xy[:, 0], xy[:, 1]))
     )
     if not np.isfinite(shapely.get_coordinates(moved)).any():
+        advice = "check which CRS each file names"
+        if source.is_geographic:
+            advice = (
+                "they are no degrees: name their CRS in the file, for a GeoJSON that names none "
+                "counts as WGS 84 (`ogr2ogr -a_srs`)"
+            )
         raise InputError(
             f"expected footprints of {path} that can be moved from {source.name} to the cloud's "
-            f"{target.name}, got coordinates outside that system; {advise(source)}"
+            f"{target.name}, got coordinates outside that system; {advice}"
         )
     return moved
 
@@ -324,16 +330,6 @@ def find_middle(geometries: np.ndarray) -> tuple[float, float]:
     boxes = boxes[np.isfinite(boxes).all(axis=1)]
     x, y = np.median((boxes[:, :2] + boxes[:, 2:]) / 2, axis=0) if len(boxes) else (0.0, 0.0)
     return float(x), float(y)
-
-
-def advise(source: CRS) -> str:
-    """Return advice about coordinates that the CRS `source` cannot have."""
-    if source.is_geographic:
-        return (
-            "they are no degrees: name their CRS in the file, for a GeoJSON that names none counts "
-            "as WGS 84 (`ogr2ogr -a_srs`)"
-        )
-    return "check which CRS each file names"
 
 
 def split_features(

@@ -33,7 +33,7 @@ from ..crs import (
 )
 from ..names import READING
 from ..plausible import HIGHEST_LAND_M, LOWEST_LAND_M
-from .raster_checks import alpha_band, band_unit, height_band, read_scaling, refuse_without_position
+from .raster_checks import band_unit, choose_bands, read_scaling, refuse_without_position
 
 TILE_PX = 512  # Side (pixels) of what is read at once. GeoTIFFs are often stored in such tiles.
 
@@ -80,8 +80,7 @@ class RasterTerrain:
         self.crs = parse_crs(crs)
         self.tile = functools.lru_cache(TILES_KEPT)(self.read_tile)
         refuse_without_position(self.dataset, self.path)
-        self.band = height_band(self.dataset, self.path)
-        self.alpha = alpha_band(self.dataset)
+        self.band, self.alpha = choose_bands(self.dataset, self.path)
         self.scale, self.offset = read_scaling(self.dataset, self.band, self.path)
         self.units = units or find_units(self.crs or self.own_crs, f"the terrain model {path}")
         self.transformer = self.make_transformer()

@@ -41,11 +41,11 @@ def refuse_without_position(dataset: Any, path: str) -> None:
         )
 
 
-def height_band(dataset: Any, path: str) -> int:
-    """Return the number of the band of heights, the first that is opaque.
+def choose_bands(dataset: Any, path: str) -> tuple[int, int | None]:
+    """Return the numbers of the band of heights, the first that is opaque, and of transparency.
 
-    Raises InputError for pictures. A raster of several such bands is used with a warning that names
-    the one taken.
+    The second is None without one: GDAL ignores it beside decimals. Raises InputError for pictures.
+    A raster of several bands of heights is used with a warning that names the one taken.
     """
     if not dataset.count:
         names = ", ".join(dataset.subdatasets[:3]) or "none"
@@ -56,26 +56,15 @@ def height_band(dataset: Any, path: str) -> int:
     kinds = [interpretation.name.lower() for interpretation in dataset.colorinterp]
     bands = [number for number, kind in enumerate(kinds, 1) if kind != "alpha"]
     band = bands[0] if bands else 1
-    if kinds[band - 1] in READING["picture_bands"] or str(dataset.dtypes[band - 1]).startswith(
-        "complex"
-    ):
-        text = (
-            "complex numbers"
-            if "complex" in str(dataset.dtypes[band - 1])
-            else f"a picture (band {kinds[band - 1]})"
-        )
+    is_complex = str(dataset.dtypes[band - 1]).startswith("complex")
+    if is_complex or kinds[band - 1] in READING["picture_bands"]:
+        text = "complex numbers" if is_complex else f"a picture (band {kinds[band - 1]})"
         raise InputError(
             f"expected a raster of heights at {path}, got {text}; name a terrain model"
         )
     if len(bands) > 1:
         warn(path, f"has {len(bands)} bands; the heights are taken from band {band}")
-    return band
-
-
-def alpha_band(dataset: Any) -> int | None:
-    """Return the band of transparency, or None: GDAL ignores it beside decimals."""
-    kinds = [interpretation.name.lower() for interpretation in dataset.colorinterp]
-    return kinds.index("alpha") + 1 if "alpha" in kinds[1:] else None
+    return band, kinds.index("alpha") + 1 if "alpha" in kinds[1:] else None
 
 
 def read_scaling(dataset: Any, band: int, path: str) -> tuple[float, float]:

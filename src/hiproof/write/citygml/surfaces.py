@@ -99,9 +99,13 @@ def boundary_surfaces(
     surfaces = []
     for number, faces in group_faces(numbers).items():
         tag, id = f"bldg:{solid.faces[number].kind}", polygon_ids[number]
-        generic = angle_attributes(figures, faces) if solid.faces[number].kind == ROOF else ""
-        for name, value in values.get(number, {}).items():
-            generic += generic_attribute(name, value)
+        known = dict(values.get(number, {}))
+        if solid.faces[number].kind == ROOF:
+            angles = zip(("slope", "azimuth"), measure_angles(figures, faces), strict=True)
+            known = {
+                n: round_value(angle, 3) for n, angle in angles if math.isfinite(angle)
+            } | known
+        generic = "".join(generic_attribute(name, value) for name, value in known.items())
         members = "".join(
             f'<gml:surfaceMember><gml:Polygon gml:id="poly-{polygon_ids[face]}">{rings[face]}'
             "</gml:Polygon></gml:surfaceMember>"
@@ -113,16 +117,6 @@ def boundary_surfaces(
             "</bldg:boundedBy>"
         )
     return surfaces
-
-
-def angle_attributes(figures: RoofFigures, faces: list[int]) -> str:
-    """Return known slope and azimuth of a roof surface with these faces."""
-    angles = dict(zip(("slope", "azimuth"), measure_angles(figures, faces), strict=True))
-    return "".join(
-        generic_attribute(key, round_value(angle, 3))
-        for key, angle in angles.items()
-        if math.isfinite(angle)
-    )
 
 
 def list_face_rings(faces: Iterable[Face], xyz: np.ndarray) -> list[str]:

@@ -27,23 +27,17 @@ class Vertices:
 
     def __init__(self, origin: np.ndarray, scale: float, units: Units = METRES) -> None:
         self.origin, self.scale, self.units = origin, scale, units
-        self.grid: list[tuple[int, int, int]] = []
-        self.index_of: dict[tuple[int, int, int], int] = {}
+        self.numbers: dict[tuple[int, ...], int] = {}
+
+    @property
+    def grid(self) -> list[tuple[int, ...]]:
+        """The vertices in the order of their numbers."""
+        return list(self.numbers)
 
     def add(self, xyz: np.ndarray) -> list[int]:
-        """Add world coordinates `xyz` (n, 3), metres, and return their indices."""
-        integers = (
-            np.rint((self.units.from_metres(xyz) - self.origin) / self.scale)
-            .astype(np.int64)
-            .tolist()
-        )
-        return [self.index(tuple(integer)) for integer in integers]
-
-    def index(self, integer: tuple[int, int, int]) -> int:
-        index = self.index_of.setdefault(integer, len(self.grid))
-        if index == len(self.grid):
-            self.grid.append(integer)
-        return index
+        """Add world coordinates `xyz` (n, 3), metres, and return their numbers."""
+        grid = np.rint((self.units.from_metres(xyz) - self.origin) / self.scale).astype(np.int64)
+        return [self.numbers.setdefault(tuple(p), len(self.numbers)) for p in grid.tolist()]
 
 
 def building_geometry(sheet: Sheet, vertices: Vertices) -> list[dict[str, Any]]:

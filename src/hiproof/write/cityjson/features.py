@@ -100,7 +100,9 @@ class CityJSONWriter(BuildingWriter):
             "CityObjects": objects,
             "vertices": vertices.grid,
         }
-        return Fragment(dump(feature) + b"\n", compute_extent(vertices) if vertices.grid else None)
+        return Fragment(
+            dump(feature) + b"\n", compute_extent(vertices) if vertices.numbers else None
+        )
 
     def put(self, fragment: Fragment) -> None:
         """Write a building whose line is about this file's offset."""

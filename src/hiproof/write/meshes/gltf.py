@@ -86,55 +86,43 @@ def write_models(path: Path, buildings: Iterable[ViewedModel], crs: str | None =
     """
     from ..files import atomic_file
 
-    content = GlbContent()
+    document, origin = GlbDocument(), np.zeros(3)
+    nodes: list[dict[str, Any]] = []
+    meshes: list[dict[str, Any]] = []
+    materials: dict[Look, int] = {}
     for model in buildings:
-        content.add(model)
-    with atomic_file(path) as file:
-        file.write(content.to_bytes(crs))
-    return len(content.nodes)
-
-
-class GlbContent:
-    """The document as it grows, a node a building."""
-
-    def __init__(self) -> None:
-        self.document = GlbDocument()
-        self.nodes: list[dict[str, Any]] = []
-        self.meshes: list[dict[str, Any]] = []
-        self.materials: dict[Look, int] = {}
-        self.origin: np.ndarray | None = None
-
-    def add(self, model: ViewedModel) -> None:
-        """Add one building: primitives of roofs by type, walls and ground."""
-        vertices = model.solid.vertices
-        if self.origin is None:
-            self.origin = np.floor(vertices.min(axis=0))
-        primitives = []
-        for look, faces in model.faces_by_look().items():
-            corners, normals = flat_triangles(vertices - self.origin, faces)
-            normal = self.document.accessor(normals.astype("<f4"))
-            places = {"POSITION": self.document.positions(corners), "NORMAL": normal}
-            material = self.materials.setdefault(look, len(self.materials))
-            primitives.append({"attributes": places, "material": material})
+        origin = origin if nodes else model.corner
         extras = merge_values({"id": model.id, "roof_type": model.roof_type}, model.attributes)
-        self.nodes.append({"name": model.id, "mesh": len(self.meshes), "extras": extras})
-        self.meshes.append({"name": model.id, "primitives": primitives})
+        nodes.append({"name": model.id, "mesh": len(meshes), "extras": extras})
+        primitives = add_primitives(document, model, origin, materials)
+        meshes.append({"name": model.id, "primitives": primitives})
+    document.tables["asset"]["extras"] = {
+        "origin": origin.tolist(),
+        "unit": "metre",
+        "crs": crs,
+        "axes": "x east, y up, z south",
+    }
+    if nodes:
+        document.tables["scenes"] = [{"nodes": list(range(len(nodes)))}]
+        document.tables |= {"nodes": nodes, "meshes": meshes}
+        document.tables["materials"] = [material_table(look) for look in materials]
+    with atomic_file(path) as file:
+        file.write(document.to_bytes())
+    return len(nodes)
 
-    def to_bytes(self, crs: str | None) -> bytes:
-        """Return the whole file."""
-        origin = (np.zeros(3) if self.origin is None else self.origin).tolist()
-        tables = self.document.tables
-        tables["asset"]["extras"] = {
-            "origin": origin,
-            "unit": "metre",
-            "crs": crs,
-            "axes": "x east, y up, z south",
-        }
-        if self.nodes:
-            tables["scenes"] = [{"nodes": list(range(len(self.nodes)))}]
-            tables |= {"nodes": self.nodes, "meshes": self.meshes}
-            tables["materials"] = [material_table(look) for look in self.materials]
-        return self.document.to_bytes()
+
+def add_primitives(
+    document: GlbDocument, model: ViewedModel, origin: np.ndarray, materials: dict[Look, int]
+) -> list[dict[str, Any]]:
+    """Add a building to a document: primitives of roofs by type, walls and ground."""
+    primitives = []
+    for look, faces in model.faces_by_look().items():
+        corners, normals = flat_triangles(model.solid.vertices - origin, faces)
+        normal = document.accessor(normals.astype("<f4"))
+        places = {"POSITION": document.positions(corners), "NORMAL": normal}
+        material = materials.setdefault(look, len(materials))
+        primitives.append({"attributes": places, "material": material})
+    return primitives
 
 
 def material_table(look: Look) -> dict[str, Any]:
