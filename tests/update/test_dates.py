@@ -82,7 +82,10 @@ def test_a_survey_older_than_that_of_the_run_is_refused(write):
             find_survey_date(clouds, earlier=earlier)
         with pytest.raises(InputError, match="2014-05-01; update a run of the older survey"):
             find_survey_date(clouds, "2014-05-01", earlier)
-    for earlier in ("", "2014", "2014-05-01", "2010-01-01"):
+    with pytest.raises(InputError, match="later than that of the run, 2014-05-01"):
+        find_survey_date(clouds, earlier="2014-05-01")
+    assert find_survey_date(clouds, "2014-05-01", "2014-05-01") == "2014-05-01"
+    for earlier in ("", "2014", "2010-01-01"):
         assert find_survey_date(clouds, earlier=earlier) == "2014-05-01"
 
 

@@ -42,17 +42,19 @@ def find_survey_date(
 
     `earlier` is the date of the survey before, or its year, "" where it is unknown. Then a survey
     that is dated by headers has to be no older than those of the `earlier_clouds`. Raises
-    InputError where `named` is no date, where nothing tells one, or where it is before `earlier`.
+    InputError where `named` is no date, where nothing tells one, or where it is not after
+    `earlier`. A `named` one may be the same day.
     """
     timed = "" if named else date_by_points(clouds)
     date = read_date(named) if named else timed or date_untimed(clouds)
     if not (earlier or named or timed):
         earlier = date_by_headers(earlier_clouds)
-    if date[: len(earlier)] < earlier:
+    is_same = not named and date == earlier
+    if is_same or date[: len(earlier)] < earlier:
         raise InputError(
-            f"expected a survey no older than that of the run, {earlier}, got {mask(clouds[0])} "
-            f"of {date}; update a run of the older survey with the newer one, or name the day of "
-            "the survey with --date"
+            f"expected a survey {'later' if is_same else 'no older'} than that of the run, "
+            f"{earlier}, got {mask(clouds[0])} of {date}; update a run of the older survey with "
+            "the newer one, or name the day of the survey with --date"
         )
     return date
 
