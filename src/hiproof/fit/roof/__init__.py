@@ -43,9 +43,8 @@ from ..union.fit import BuildingFit
 from ..union.objective import is_base_visible
 from ..union.outline import draw_outline
 from ..union.plan import Plan, lay_out_plan
-from ..union.prices import LARGE_ROOF_M2
 from ..union.scene import VISIBLE_DEPTH_M, Scene, place_nodes
-from ..union.search import find_volumes
+from ..union.search import SEARCH_POINTS, find_volumes
 from ..union.whole import Whole
 from .accept import LOOP_ROUNDS, improve
 from .add import add_volumes
@@ -127,13 +126,13 @@ def name_volumes(
 def improve_beside(roof: Tables, site: Site, whole: Whole) -> tuple[Tables, Site]:
     """Improve a roof, also with its points moved to where its eaves are level, if that is cheaper.
 
-    Volumes are added where points of a large `whole` are unexplained. Returns the roof and the site
-    that it explains.
+    Volumes are added where points of the `whole` are unexplained, if the search has not seen all of
+    them. Returns the roof and the site that it explains.
     """
     trial, drawing = make_tables_like(roof), make_drawing(len(roof.sides))
     cost = improve_all(roof, trial, site, drawing)
-    is_large = whole.area > LARGE_ROOF_M2
-    if is_large and (added := add_volumes(roof, trial, site, drawing, whole)).any():
+    is_thinned = whole.scene.n > SEARCH_POINTS  # else the search has seen every point
+    if is_thinned and (added := add_volumes(roof, trial, site, drawing, whole)).any():
         cost = improve(roof, trial, site, drawing, added, LOOP_ROUNDS)
     shift = estimate_shift(roof, site)
     if not shift.any():
