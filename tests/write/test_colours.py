@@ -8,13 +8,12 @@ import pytest
 from hiproof.primitives import CATALOGUE
 from hiproof.write.colours import (
     CHANGE_COLOURS,
+    COLOURS,
     GRADE_COLOURS,
-    MARK_COLOUR,
     RESIDUAL_STOPS,
     ROOF_COLOURS,
     STATUS_COLOURS,
     SUN_STOPS,
-    UNCHANGED_COLOUR,
     UNKNOWN_COLOUR,
     WALL_COLOUR,
     linear_rgb,
@@ -42,10 +41,10 @@ SEEN = {
 }
 XYZ = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
 LEGENDS = {
-    "roof types": [*ROOF_COLOURS.values(), WALL_COLOUR, MARK_COLOUR],
+    "roof types": [*ROOF_COLOURS.values(), WALL_COLOUR, COLOURS["mark"]],
     "quality": [*GRADE_COLOURS.values(), UNKNOWN_COLOUR],
     "status": list(STATUS_COLOURS.values()),
-    "changes": [*CHANGE_COLOURS.values(), UNCHANGED_COLOUR],
+    "changes": [*CHANGE_COLOURS.values(), COLOURS["unchanged"]],
     "residuals": [colour for _, colour in RESIDUAL_STOPS],
     "sun": [colour for _, colour in SUN_STOPS],
 }
