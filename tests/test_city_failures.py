@@ -38,8 +38,8 @@ STAGES = (
 )
 WRITERS = (
     (run_files, "measure_or_drop_solid"),
-    (run_files, "building_attributes"),
-    *((module, "fragment") for module in (parameters, features, version2)),
+    (run_files, "describe"),
+    *((module.writer, "fragment") for module in (parameters, features, version2)),
 )
 
 

@@ -49,7 +49,7 @@ def find_survey_date(
     date = read_date(named) if named else timed or date_untimed(clouds)
     if not (earlier or named or timed):
         earlier = date_by_headers(earlier_clouds)
-    is_same = not named and date == earlier
+    is_same = timed and date == earlier
     if is_same or date[: len(earlier)] < earlier:
         raise InputError(
             f"expected a survey {'later' if is_same else 'no older'} than that of the run, "
