@@ -36,7 +36,7 @@ from .tables import (
     TO_OUTLINE,  # side b of volume a on line c of the outline
     TO_LINE,  # side b of volume a on line c of the roof
     RUN_ON,  # side b of volume a, by step c
-    MERGE,  # volume b, with its planes, into a, whose planes then face as c says (0: as they do)
+    MERGE,  # volume b into a, whose planes then face as c says (0: as they do), with b's if d
     FACE,  # planes of volume a face as b says
     TURN,  # volume a replaces instead of joining, or joins
     GIVE_WALL,  # volume a a plane from line b of the outline, with slope c and height d of others
@@ -135,8 +135,11 @@ def list_merges(roof, site, j, k, moves, count):
     if max(along, across) >= SAME_DIRECTION:
         for way in range(FACE_SIDES + 1):
             if not site.keeps_shapes or has_alike(roof, j, k):
-                count = write_move(moves, count, MERGE, j, k, way, 0)
-                count = write_move(moves, count, MERGE, k, j, way, 0)
+                count = write_move(moves, count, MERGE, j, k, way, 1)
+                count = write_move(moves, count, MERGE, k, j, way, 1)
+        if roof.n_planes[j] != roof.n_planes[k] or not has_alike(roof, j, k):
+            count = write_move(moves, count, MERGE, j, k, 0, 0)
+            count = write_move(moves, count, MERGE, k, j, 0, 0)
     return count
 
 
@@ -355,7 +358,7 @@ def apply_move(roof, move, site, changed):
         is_possible = line != 0
         roof.sides[a, b] = line if is_possible else roof.sides[a, b]
     elif kind == MERGE:
-        is_possible = roof.n_planes[b] > 0 and merge(roof, a, b, site)
+        is_possible = roof.n_planes[b] > 0 and merge(roof, a, b, site, d)
         changed[b] = True
         if is_possible and c:  # the same merge, if no plane turns
             is_possible = face_planes(roof, a, c, site)
@@ -504,8 +507,8 @@ def share(roof, a, b, changed):
 
 
 @compiled
-def merge(roof, a, b, site):
-    """Draw volume a out over b, with the planes that only b has, and leave b out."""
+def merge(roof, a, b, site, takes_planes):
+    """Draw volume a out over b, perhaps with the planes that only b has, and leave b out."""
     for s in range(N_SIDES):
         half, best = roof.half_planes[a, s], 0
         for t in range(N_SIDES):
@@ -518,7 +521,7 @@ def merge(roof, a, b, site):
         e, f, g = read_line(roof, best)
         if length > 0.0 and e * x + f * y + g > 0.0:
             roof.sides[a, s] = best
-    for p in range(roof.n_planes[b]):
+    for p in range(roof.n_planes[b] if takes_planes else 0):
         if not has_alike_plane(roof, a, b, p):
             add_plane(roof, a, roof.plane_lines[b, p], roof.heights[b, p], roof.slopes[b, p])
     roof.n_planes[b] = 0

@@ -9,7 +9,7 @@ import numpy as np
 from ...compiled import compiled
 from .around import measure_context
 from .candidates import SAME_SLOPE, find_best_rectangles
-from .edges import EVERYWHERE, NO_GAIN, move_edges
+from .edges import EVERYWHERE, MIN_SIDE_M, NO_GAIN, move_edges
 from .improve import improve
 from .objective import compute_costs, compute_objective_with
 from .prices import (
@@ -41,6 +41,8 @@ FEWEST_UNEXPLAINED = 4  # Fewest unexplained points that are worth a further vol
 # Share of the highest misfit from which on points count in a roof that leaves none unexplained but
 # costs much: the base half way up a skirt lies within a quarter of a metre of all of it.
 POORLY = 0.3
+CUT_LEAST_M = 0.3  # Least length (m) by which a neighbour is cut back for a new volume.
+CUT_MOST_SHARE = 0.6  # Largest share of a neighbour that is cut back for a new volume.
 
 # How adding ends: no candidate helps, nothing is left to explain (or the most additions were
 # tried), or a known roof has come back.
@@ -128,12 +130,18 @@ def find_best_addition(volumes, value, ground, candidates):
             new[U0], new[U1] = lines[0, cells[m, 0]], lines[0, cells[m, 1]]
             new[V0], new[V1] = lines[1, cells[m, 2]], lines[1, cells[m, 3]]
             surcharge = FREELY_UNITS * scene.evidence if has_free_plane(new, scene) else 0.0
-            new[REPLACES] = 1.0 if replacing and len(volumes) > 1 else 0.0
+            if replacing and len(volumes) > 1:
+                new[REPLACES] = 1.0
             trial, trial_value = settle_new(
-                extended, scene, min(value, lowest) - surcharge, context
+                extended.copy(), scene, min(value, lowest) - surcharge, context
             )
             if trial_value < np.inf:
                 best, lowest = trial, trial_value
+            if replacing:
+                new[REPLACES] = 0.0
+                best, lowest = cut_back_neighbours(
+                    volumes, extended, scene, best, lowest, value, surcharge
+                )
             gains[m] = -np.inf
     return best, lowest
 
@@ -148,6 +156,43 @@ def has_free_plane(volume, scene):
             if np.abs(np.abs(walls) - lean).min() > SAME_SLOPE:
                 return True
     return False
+
+
+@compiled
+def cut_back_neighbours(volumes, extended, scene, best, lowest, value, surcharge):
+    """Cut back each volume that the last of the `extended` ones overlaps, in turn.
+
+    It is cut to where the last one begins. Returns the best roof of these and of `best`, which
+    costs `lowest`.
+    """
+    last = len(extended) - 1
+    for j in range(1, last):
+        if extended[j, DIRECTION] != extended[last, DIRECTION]:
+            continue
+        if not has_overlap(extended[j], extended[last]):
+            continue
+        for edge in range(4):
+            start, end = extended[j, U0 + (edge & 2)], extended[j, U1 + (edge & 2)]
+            stop = extended[last, U0 + (edge ^ 1)]
+            overhang = stop - start if edge % 2 == 0 else end - stop
+            if (
+                CUT_LEAST_M < overhang < CUT_MOST_SHARE * (end - start)
+                and end - start - overhang >= MIN_SIDE_M
+            ):
+                cut = extended.copy()
+                cut[j, U0 + edge] = stop
+                context = measure_context(cut, scene.U, scene.V, scene.order, last)
+                trial, trial_value = settle_new(cut, scene, min(value, lowest) - surcharge, context)
+                if trial_value < np.inf:
+                    best, lowest = trial, trial_value
+    return best, lowest
+
+
+@compiled
+def has_overlap(row, other):
+    """Return whether two rectangles have more than a strip in common."""
+    u = min(row[U1], other[U1]) - max(row[U0], other[U0])
+    return min(u, min(row[V1], other[V1]) - max(row[V0], other[V0])) > CUT_LEAST_M
 
 
 @compiled
