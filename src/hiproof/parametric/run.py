@@ -126,13 +126,13 @@ def make_fragments(
     for number, record in enumerate(records, 1):
         id = record["id"]
         names = taken[0].take(plain_text(id)), taken[1].take(gml_name(id))
-        building, texts = make_texts(record, names, head)
+        building, texts = build_texts(record, names, head)
         built.count(building)
         progress(number)
         yield texts
 
 
-def make_texts(
+def build_texts(
     record: dict[str, Any], names: tuple[str, str], head: FileHead
 ) -> tuple[Building, Fragments]:
     """Return an object's building and texts; without a model it keeps its parameters."""

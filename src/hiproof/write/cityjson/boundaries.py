@@ -57,9 +57,9 @@ def building_geometry(sheet: Sheet, vertices: Vertices) -> list[dict[str, Any]]:
     solids = []
     if LOD_SOLID in lods and not shapes.parts:
         whole = building.solid, sheet.figures, vertices, LOD_SOLID, sheet.surfaces
-        solids.append(described_solid(sheet, *whole))
+        solids.append(describe_solid(sheet, *whole))
     if LOD_OVERHANGS in lods:
-        solids.append(described_solid(sheet, *sheet.finest, vertices, LOD_OVERHANGS, {}))
+        solids.append(describe_solid(sheet, *sheet.finest, vertices, LOD_OVERHANGS, {}))
     blocks = [(shapes.lod12, "1.2"), (shapes.lod13, "1.3")]
     return [
         *level_surfaces(building, shapes, vertices),
@@ -73,7 +73,7 @@ def part_geometry(sheet: Sheet, part: PartShape, vertices: Vertices) -> list[dic
     geometry = [] if part.block is None else [solid_geometry(part.block, vertices, "1.3")]
     if LOD_SOLID in sheet.head.write.lods:
         whole = part.solid, part.figures, vertices, LOD_SOLID
-        geometry.append(described_solid(sheet, *whole, {}))
+        geometry.append(describe_solid(sheet, *whole, {}))
     return geometry
 
 
@@ -135,7 +135,7 @@ def solid_geometry(
     return {"type": "Solid", "lod": lod, "boundaries": [boundaries], "semantics": semantics}
 
 
-def described_solid(
+def describe_solid(
     sheet: Sheet,
     solid: Solid,
     figures: RoofFigures,
