@@ -129,6 +129,25 @@ def test_a_year_without_clear_hours_comes_with_a_warning(factor, tmp_path):
         make_sky(*DELFT, 0.0, 0.0, str(tmp_path / "a.epw"))
 
 
+def copy_days(source, first, count):
+    """Return a change that puts the radiation of a day of the year on `count` others."""
+
+    def change(columns):
+        for name in ("ghi", "dhi", "dni"):
+            days = columns[name].reshape(365, 24)
+            days[first : first + count] = days[source]
+
+    return change
+
+
+@pytest.mark.parametrize("source, first, count", [(100, 101, 1), (171, 190, 4), (150, 152, 3)])
+def test_days_that_repeat_another_come_with_a_warning(source, first, count, tmp_path):
+    write_epw(tmp_path / "a.epw", change=copy_days(source, first, count))
+    days = "1 day" if count == 1 else f"{count} days"
+    with pytest.warns(InputWarning, match=f"a.epw: repeats the radiation of .* on {days}, first"):
+        make_sky(*DELFT, 0.0, 0.0, str(tmp_path / "a.epw"))
+
+
 @settings(max_examples=20, deadline=None)
 @given(
     latitude=st.floats(-65, 65),
@@ -147,6 +166,7 @@ def test_a_year_is_taken_only_in_its_own_time_zone(latitude, longitude, off):
             assert read_year(str(path)).where == (latitude, longitude)
 
 
+@pytest.mark.filterwarnings("error::hiproof.errors.InputWarning")
 def test_the_stations_of_pvlib_are_taken():
     for path in Path(pvlib.__path__[0], "data").glob("7*TY*"):
         assert len(read_year(str(path)).times) == 8760

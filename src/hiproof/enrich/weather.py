@@ -46,6 +46,7 @@ BRIGHTEST, LEAST_BRIGHTNESS = 0.99, 0.5
 """Quantile of the hours with a high sun, and the share of the radiation above the atmosphere that
 it has to reach: clear skies let 0.7 to 0.8 pass, and every climate has clear hours.
 """
+FEWEST_EQUAL = 8  # hours with sun from which on two days that are alike in all are copies
 DAYLIGHT_RISE = 0.25  # sine of the sun's elevation (15 degrees) at noon from which no day is dark
 
 
@@ -241,6 +242,7 @@ def refuse_other_sun(weather: Weather, path: str) -> None:
     is_high = rise > DAYLIGHT_RISE
     brightness = float(np.quantile((ghi / ceiling)[is_high] / rise[is_high], BRIGHTEST))
     warn_of_dull_sun(path, float(dhi.sum()) / total, brightness)
+    warn_of_copied_days(weather, path)
 
 
 def warn_of_dull_sun(path: str, diffuse_share: float, brightness: float) -> None:
@@ -257,6 +259,26 @@ def warn_of_dull_sun(path: str, diffuse_share: float, brightness: float) -> None
             f"has no clear hours; the brightest have {brightness:.0%} of what reaches the "
             "atmosphere, and 70 % are usual, so all sun may be too low; check that the unit is "
             "W/m2",
+        )
+
+
+def warn_of_copied_days(weather: Weather, path: str) -> None:
+    """Warn of days whose radiation is that of an earlier day in every hour."""
+    days = weather.values[["ghi", "dhi", "dni"]].to_numpy(float).reshape(-1, 24, 3)
+    _, first, kind = np.unique(
+        days.reshape(len(days), -1), axis=0, return_index=True, return_inverse=True
+    )
+    is_lit = (days[:, :, 0] > 0).sum(axis=1) >= FEWEST_EQUAL
+    copies = np.flatnonzero(is_lit & (first[kind.ravel()] < np.arange(len(days))))
+    if len(copies):
+        copy, source = (
+            f"{weather.times[24 * k]:%d %B}" for k in (copies[0], first[kind[copies[0]]])
+        )
+        warn(
+            path,
+            f"repeats the radiation of an earlier day on {count_things(len(copies), 'day')}, first "
+            f"that of {source} on {copy}; check that days were not copied, and use another file if "
+            "they were",
         )
 
 
