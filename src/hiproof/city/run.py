@@ -43,6 +43,7 @@ from .work.bundle_folders import FAILURES_FOLDER, bundles_in, remove_bundles
 from .work.cores import as_many_as_pay
 from .work.executors import make_executor
 from .work.queue import Queue
+from .work.seams import warn_of_steps
 from .work.solve import solve_tile
 from .work.sort import sort_cloud
 from .work.tasks import MAIN_JOB, WITHOUT_FOOTPRINTS
@@ -151,6 +152,7 @@ def reconstruct_in_folder(
         refuse_without_points(plan, ledger, steps.may_be_bare)
         clock.lap("sort")
         if ledger.open_tasks("solve"):
+            warn_of_steps(state / "points", request.clouds)
             steps.before(plan, executor, progress)
         queue.work_off("solve", steps.solve_tile)
         clock.lap("solve")

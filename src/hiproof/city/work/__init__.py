@@ -6,6 +6,7 @@ noted         where the points of each file lie, for whoever wants some of them 
 solve         each work tile reconstructs its own buildings and writes them as text, ready to join
 solved        buildings counted as they are solved, for the progress of a run
 ground        the ground around a building, from its tile's cells; a terrain model against it
+seams         the heights of point files where they meet
 surveys       the points of several surveys, and those of which a model is made
 found         the roof of one building among points without classes
 other_classes what the points of other classes say of a building

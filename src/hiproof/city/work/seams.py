@@ -1,0 +1,77 @@
+"""The heights of point files where they meet.
+
+Files are joined as they are. One in another height system or unit puts its buildings elsewhere, and
+cuts those at its border in two.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from itertools import chain, combinations
+from pathlib import Path
+
+import numpy as np
+
+from ...errors import warn
+from ...geometry.thin import thin_to_grid
+from ...log import count_things
+from ...masking import mask
+from .ground import fit_planes
+
+AROUND, AROUND_M = 8, 3.0  # points of one file that give the ground at a place of the other
+FEWEST_PLACES, ENOUGH_PLACES = 30, 1000  # that show a step, and after which no more are looked at
+STEP_M = 0.5  # between two files: that of strips, seasons and of most work on the ground is less
+SPREAD = 0.5  # of a step that is the same everywhere: the middle half of its heights, as a share
+
+
+def warn_of_steps(points: Path, clouds: Sequence[str]) -> None:
+    """Warn of point files that lie higher or lower than those which they touch.
+
+    `points` is the folder of sorted points, in which the files of each work tile begin with their
+    numbers among the `clouds`.
+    """
+    steps: dict[tuple[int, int], list[float]] = defaultdict(list)
+    for tile in sorted({path.parent for path in points.rglob("*.npz")}):
+        files: dict[int, list[Path]] = defaultdict(list)
+        for path in sorted(tile.glob("[0-9]*.npz")):
+            files[int(path.name.split("-")[0])].append(path)
+        pairs = [
+            pair for pair in combinations(sorted(files), 2) if len(steps[pair]) < ENOUGH_PLACES
+        ]
+        ground = {number: load_ground(files[number]) for number in {*chain(*pairs)}}
+        for first, second in pairs:
+            steps[first, second].extend(measure_steps(ground[first], ground[second]))
+    for (first, second), heights in steps.items():
+        low, step, high = np.quantile(heights or [0.0], (0.25, 0.5, 0.75))
+        is_alike = high - low < SPREAD * abs(step)
+        if len(heights) >= FEWEST_PLACES and abs(step) > STEP_M and is_alike:
+            warn(
+                mask(clouds[second]),
+                f"its ground lies {abs(step):.2f} m {'above' if step > 0 else 'below'} that of "
+                f"{mask(clouds[first])}, in {count_things(len(heights), 'place')} where the two "
+                "meet, so the heights of one are of another system or unit; bring both to one, or "
+                "leave one out",
+            )
+
+
+def load_ground(paths: Sequence[Path]) -> np.ndarray:
+    """Load the ground (n, 3) that a point file has in a work tile, or else its lowest points."""
+    found: dict[str, list[np.ndarray]] = {"ground": [], "low": []}
+    for path in paths:
+        with np.load(path) as part:
+            for kind in found.keys() & set(part.files):
+                found[kind].append(part[kind])
+    points = found["ground"] or found["low"] or [np.zeros((0, 3))]
+    return thin_to_grid(np.concatenate(points), 1.0)
+
+
+def measure_steps(first: np.ndarray, second: np.ndarray) -> list[float]:
+    """Return how much (k,) higher points (n, 3) lie than planes through those (m, 3) around."""
+    from scipy.spatial import KDTree
+
+    index = KDTree(first[:, :2]).query(second[:, :2], AROUND, distance_upper_bound=AROUND_M)[1]
+    around = np.vstack([first, np.full(3, np.nan)])[index]
+    is_known = np.isfinite(around[:, 2, 2])
+    xyz, around = second[is_known], around[is_known]
+    return (xyz[:, 2] - fit_planes(xyz[:, :2], around)).tolist() if len(xyz) else []
