@@ -33,11 +33,10 @@ def scan(rng, roof, density=8.0):
     return np.column_stack([xy, z + rng.normal(0, 0.03, len(xy))])[known]
 
 
-def make_roof(kind="gable", parameters=None, eave=6.0):
+def make_roof(kind="gable", parameters=None, eave=6.0, place=(0.0, 0.0)):
     parameters = parameters or (FLAT if kind == "flat" else GABLE)
-    return assemble(
-        (make_part(kind, parameters, 0.3, np.array([0.0, 0.0, eave])),), "single", (0.0, 0.0, 0.0)
-    )
+    part = make_part(kind, parameters, 0.3, np.array([*place, eave]))
+    return assemble((part,), "single", (0.0, 0.0, 0.0))
 
 
 def judge(old, new, significance=0.001, **options):
@@ -114,6 +113,17 @@ def test_an_added_storey_is_measured_within_two_centimetres(rng):
     assert place.kind is ChangeKind.ROOF_RAISED
     assert place.difference_m == pytest.approx(2.8, abs=0.02)
     assert place.sigma_m < 0.03
+
+
+@pytest.mark.parametrize("up, kind", [(2.8, "roof_raised"), (-1.5, "roof_lowered")])
+@pytest.mark.parametrize("place", [(-0.15, 0.48), (0.15, -0.48)])
+def test_a_roof_that_lies_higher_and_aside_keeps_its_slope(up, kind, place, rng):
+    """As where a single house is raised and its survey lies aside, by an unknown shift."""
+    before, after = make_roof(), make_roof(eave=6.0 + up, place=place)
+    verdict = judge((before.roof, scan(rng, before.roof)), scan(rng, after.roof))
+    (found,) = name_differences(verdict, before.roof, after.roof, 0.01)
+    assert found.kind.code == kind
+    assert found.difference_m == pytest.approx(up, abs=0.05)
 
 
 def test_bare_ground_inside_the_outline_makes_a_building_gone(rng):

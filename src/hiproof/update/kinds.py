@@ -14,7 +14,7 @@ import shapely
 
 from ..model import Roof
 from ..status import ChangeKind
-from .cells import MEDIAN_VARIANCE, CellComparison
+from .cells import MEDIAN_VARIANCE, CellComparison, find_slopes
 from .clusters import ChangedCells
 from .judge import OVER_GROUND_M, ChangeVerdict, find_heights
 from .lineage import show_parts
@@ -29,6 +29,10 @@ TOGETHER = 0.75
 CROSSING, HALF = 0.2, 0.5
 """Shares of a roof's cells that contradict it where its type, or its slope, is another: the more
 alike two roofs are, the more cells both have in common."""
+
+SAME_SLOPE = 0.06
+"""Gradient by which a roof's slopes may differ between two models: 2.5 degrees at 40. A change of
+0.5 m over half the width of a house is twice as much."""
 
 LARGER = 0.1
 """Share of a roof's cells from which on a part of it has to take part in a change of the whole."""
@@ -153,9 +157,37 @@ def name_whole(inside: np.ndarray, sides: BeforeAfter) -> Difference | None:
         and not moves_together(d[inside])
     ):
         is_other = is_other_type(pair, sides)
+        if not is_other and keeps_slope(inside, sides):
+            return name_raised_aside(inside, pair, sides)
         if inside.mean() >= (CROSSING if is_other else HALF):
             kind = ChangeKind.TYPE_CHANGED if is_other else ChangeKind.SLOPE_CHANGED
     return kind and describe_place(kind, everywhere, pair, sides)
+
+
+def keeps_slope(inside: np.ndarray, sides: BeforeAfter) -> bool:
+    """Return whether cells `inside` (k,) all went up, or all down, and slope as before."""
+    d, xy = sides.difference[inside], sides.comparison.centres[sides.members[inside]]
+    if sides.after is None or d.min() * d.max() < 0:
+        return False
+    before, after = (find_slopes(roof, xy) for roof in (sides.before, sides.after))
+    known = np.isfinite(before + after).all(axis=1)
+    off = np.hypot(*(after - before)[known].T)
+    return bool(known.any() and np.median(off) < SAME_SLOPE)
+
+
+def name_raised_aside(
+    inside: np.ndarray, pair: tuple[int, int], sides: BeforeAfter
+) -> Difference | None:
+    """Name a roof that lies higher or lower and aside: one slope moved by more than the other."""
+    if inside.mean() < HALF:
+        return None
+    slopes = find_slopes(sides.before, sides.comparison.centres[sides.members])
+    known = inside & np.isfinite(slopes).all(axis=1)
+    design = np.column_stack([np.ones(known.sum()), slopes[known]])
+    rise = float(np.linalg.lstsq(design, sides.difference[known], rcond=None)[0][0])
+    kind = ChangeKind.ROOF_RAISED if rise > 0 else ChangeKind.ROOF_LOWERED
+    place = describe_place(kind, np.ones(len(inside), bool), pair, sides)
+    return dataclasses.replace(place, difference_m=rise)
 
 
 def find_moved(inside: np.ndarray, d: np.ndarray) -> np.ndarray:
@@ -183,7 +215,7 @@ def name_cluster(cluster: ChangedCells, inside: np.ndarray, sides: BeforeAfter) 
     together = moves_together(sides.difference[inside])
     if sides.on_ground[inside].mean() > HALF:
         kind = ChangeKind.PART_REMOVED
-    elif is_part and is_same_place(pair, sides) and not together:
+    elif is_part and is_same_place(pair, sides) and not (together or keeps_slope(inside, sides)):
         other = is_other_type(pair, sides)
         kind = ChangeKind.TYPE_CHANGED if other else ChangeKind.SLOPE_CHANGED
     elif cluster.area_m2 < SMALL_M2 or abs(cluster.difference_m) < THIN_LAYER_M:
