@@ -134,6 +134,35 @@ def test_bare_ground_inside_the_outline_makes_a_building_gone(rng):
     assert judge((roof, old), ground[:0]).change is Change.NOT_COVERED
 
 
+def let_pass(rng, points, share, inside=None):
+    """Let a share of the pulses through to the ground, in all of a roof or `inside` a polygon."""
+    passes = rng.random(len(points)) < share
+    if inside is not None:
+        passes &= shapely.intersects_xy(inside, *points[:, :2].T)
+    return np.where(passes[:, None], points * (1, 1, 0), points)
+
+
+@pytest.mark.parametrize("density", [4.0, 12.0, 24.0])
+@pytest.mark.parametrize("before, after", [(0.0, 0.85), (0.3, 0.85), (0.85, 0.85), (0.85, 0.7)])
+def test_glass_that_most_pulses_pass_still_stands(density, before, after, rng):
+    found = []
+    for _ in range(6):
+        roof = make_roof(eave=4.0).roof
+        old, new = (let_pass(rng, scan(rng, roof, density), share) for share in (before, after))
+        found.append(judge((roof, old), new).change)
+    allowed = {Change.UNCHANGED, Change.UNCERTAIN}
+    assert sum(change in allowed for change in found) >= 5 and Change.GONE not in found
+
+
+def test_a_conservatory_under_glass_is_not_pulled_down(rng):
+    roof = make_roof(eave=4.0).roof
+    west = shapely.box(-20, -20, -2, 20)
+    glass = let_pass(rng, scan(rng, roof, 12.0), 0.85, west)
+    bare = let_pass(rng, scan(rng, roof, 12.0), 1.0, west)
+    assert judge((roof, scan(rng, roof, 12.0)), glass).change is Change.UNCERTAIN
+    assert judge((roof, scan(rng, roof, 12.0)), bare).change is Change.CHANGED
+
+
 def cover_with_leaves(rng, points):
     """A crown over a third of the roof, which lets a third of the pulses through."""
     hit = (points[:, 0] > 2.0) & (rng.random(len(points)) < 0.67)

@@ -8,6 +8,7 @@ import numpy as np
 
 # With which a column and a row make one number: as many rows as no grid of a world has.
 KEY_OF_CELL = np.array([2**32, 1])
+AROUND_KEYS = np.array([(u, v) for u in (-1, 0, 1) for v in (-1, 0, 1)]) @ KEY_OF_CELL
 
 
 def number_cells(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -12,10 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..geometry.grid import AROUND_KEYS, KEY_OF_CELL
 from ..model import Roof
 from ..status import Change
 from .cells import CellComparison, compare_points, predict_occupancy
-from .clusters import ChangedCells, find_clusters
+from .clusters import KEPT_SHARE, ChangedCells, find_clusters
 from .ground import Ground
 from .register import SurveyShift
 
@@ -25,14 +26,19 @@ COVERED = 0.5
 FEWEST_COMPARED = 4
 """Cells that have to be compared, below which chance decides."""
 
-GONE_SHARE = 0.7
-"""Share of the compared cells that have to lie on bare ground, for a building to be gone."""
+GONE_SHARE, LEAST_ROOF = 0.7, 0.2
+"""Shares of the cells that were roof, and of all compared ones, that have to lie on bare ground for
+a building to be gone. Of glass few cells were roof before."""
 
 OVER_GROUND_M = 1.0
 """Points less high above the ground (m) lie on it, and roofs higher."""
 
 WHOLE_SHARE = 0.7
 """Share of the cells that have to move with the roof as a whole."""
+
+PASSED_SHARE, FEWEST_LEFT = 0.03, 3
+"""Share, and number, of the new points over bare ground that still lie on the earlier roof, from
+which on pulses pass it, as glass lets most of them. Under a roof that is gone hardly one does."""
 
 SMALLEST_M2 = 2.0
 """Area (m2) below which a cluster is a chimney, an aerial or the edge of something."""
@@ -74,7 +80,9 @@ def judge_building(
     comparison = compare_points(roof, old, new, shift.noise)
     if is_not_covered(comparison, roof):
         return ChangeVerdict(Change.NOT_COVERED, comparison, ground)
-    if is_gone(comparison, roof, ground):
+    was_roof, on_ground = find_bare(comparison, roof, ground)
+    is_passed = passes_pulses(comparison, was_roof, on_ground, np.arange(len(comparison.cells)))
+    if is_gone(comparison, was_roof, on_ground) and not is_passed:
         return ChangeVerdict(Change.GONE, comparison, ground, 0.0)
     found = [c for c in find_clusters(comparison, shift.noise.stray) if c.area_m2 >= SMALLEST_M2]
     likely = [c for c in found if c.chance < significance]
@@ -82,9 +90,12 @@ def judge_building(
     clear = tuple(
         c
         for c in likely
-        if (c.is_surface or lies_bare(c, comparison, ground)) and c.area_m2 > beyond
+        if (c.is_surface or lies_bare(c, comparison, ground))
+        and c.area_m2 > beyond
+        and not passes_pulses(comparison, was_roof, on_ground, c.members)
     )
-    chance = min([compute_whole_chance(comparison, shift), *(c.chance for c in clear)])
+    whole_chance = 1.0 if is_passed else compute_whole_chance(comparison, shift)
+    chance = min([whole_chance, *(c.chance for c in clear)])
     if clear or chance < significance:
         return ChangeVerdict(Change.CHANGED, comparison, ground, chance, clear)
     doubtful = tuple(c for c in likely if c.area_m2 >= DOUBTFUL_M2)
@@ -108,13 +119,45 @@ def is_not_covered(comparison: CellComparison, roof: Roof) -> bool:
     return bool(share < (COVERED / 2 if without_old else COVERED))
 
 
-def is_gone(comparison: CellComparison, roof: Roof, ground: Ground) -> bool:
-    """Return whether bare ground lies where the roof was."""
+def find_bare(
+    comparison: CellComparison, roof: Roof, ground: Ground
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return whether (k,) cells were roof, and whether they lie on the ground now."""
     c = comparison
     heights = find_heights(roof, c) - ground.height_at(c.centres)
     was_roof = c.is_compared & (heights + c.old > 2 * OVER_GROUND_M)
-    on_ground = was_roof & (heights + c.new < OVER_GROUND_M)
-    return int(on_ground.sum()) >= max(FEWEST_COMPARED, GONE_SHARE * int(was_roof.sum()))
+    return was_roof, c.is_compared & (heights + c.new < OVER_GROUND_M)
+
+
+def is_gone(comparison: CellComparison, was_roof: np.ndarray, on_ground: np.ndarray) -> bool:
+    """Return whether bare ground lies where the roof was, in cells (k,).
+
+    It does not where either survey has points on the other's surface.
+    """
+    is_other = np.maximum(comparison.kept, comparison.known) <= KEPT_SHARE
+    bare, roof, all_cells = (
+        int(cells.sum())
+        for cells in (was_roof & on_ground & is_other, was_roof, comparison.is_compared)
+    )
+    return bare >= max(FEWEST_COMPARED, GONE_SHARE * roof, LEAST_ROOF * all_cells)
+
+
+def passes_pulses(
+    comparison: CellComparison, was_roof: np.ndarray, on_ground: np.ndarray, members: np.ndarray
+) -> bool:
+    """Return whether pulses pass the earlier roof to the ground in and around cells `members` (m,).
+
+    Some points lie on it still, in cells that have the ground all around: what is left of a roof
+    that was pulled down lies together.
+    """
+    c, keys = comparison, comparison.cells.astype(np.int64) @ KEY_OF_CELL
+    selection = np.flatnonzero(
+        was_roof & on_ground & np.isin(keys, keys[members, None] + AROUND_KEYS)
+    )
+    standing = keys[c.is_compared & ~on_ground]
+    inner = selection[~np.isin(keys[selection, None] + AROUND_KEYS, standing).any(axis=1)]
+    kept = float(c.kept[inner] @ c.n_new[inner])
+    return kept >= max(FEWEST_LEFT, PASSED_SHARE * float(c.n_new[inner].sum()))
 
 
 def lies_bare(cluster: ChangedCells, comparison: CellComparison, ground: Ground) -> bool:

@@ -144,7 +144,7 @@ class LostParts:
         """
         c, ground = verdict.comparison, verdict.ground
         bare = [cluster for cluster in verdict.clusters if lies_bare(cluster, c, ground)]
-        if not bare:
+        if not bare or verdict.change is Change.UNCERTAIN:
             return None
         places = c.centres[np.concatenate([cluster.members for cluster in bare])]
         is_low = c.points[:, 2] - ground.height_at(c.points) < OVER_GROUND_M

@@ -18,7 +18,7 @@ import shapely
 from ..city.plan.work_plan import WorkPlan, load_plan
 from ..city.work.sort import sort_cloud
 from ..geometry.components import label_components
-from ..geometry.grid import KEY_OF_CELL, number_cells
+from ..geometry.grid import AROUND_KEYS, KEY_OF_CELL, number_cells
 from ..model import PointCloud
 from ..settings import ReadSettings
 from ..status import ChangeKind
@@ -54,8 +54,6 @@ BLOCK_M, BLOCK_REACH_M = 1000.0, 200.0
 loaded: roofs that are longer are cut."""
 
 ROUNDING_M = 1e-6  # far above the errors of a mean, far below the millimetres of coordinates
-
-AROUND_KEYS = np.array([(u, v) for u in (-1, 0, 1) for v in (-1, 0, 1)]) @ KEY_OF_CELL
 
 
 class SurveyCells:
