@@ -10,7 +10,7 @@ from benchmarks.matching import has_hidden_end, list_right_types, merge_alike
 
 from hiproof.compose import check_solid, compose
 from hiproof.fit.roof import fit_building
-from hiproof.fit.roof.parts import REGISTERED_M, REGISTERED_PLAN_M
+from hiproof.fit.roof.deviations import REGISTERED_M, REGISTERED_PLAN_M
 from hiproof.model import Roof
 from hiproof.primitives import CATALOGUE, get
 from hiproof.primitives.family import COMPONENTS, GENERAL_SHAPES, compute_planes

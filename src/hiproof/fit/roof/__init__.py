@@ -161,7 +161,7 @@ def read_parts(
     roof: Tables, site: Site, outline: shapely.Polygon, plan: Plan, types: tuple[str, ...]
 ) -> list[Part]:
     """Name what each volume roofs of an `outline` in the plan's coordinates."""
-    covariance, is_anchored = estimate_covariance(roof, site), find_anchored(roof, site)
+    (free, covariance), is_anchored = estimate_covariance(roof, site), find_anchored(roof, site)
     inner, outer, parts = make_tables_like(roof), make_tables_like(roof), []
     for k, polygons, is_cut in list_places(roof, draw_whole_roof(roof, site), outline):
         axes = find_axes(roof, k)
@@ -169,8 +169,8 @@ def read_parts(
         sigmas = estimate_side_sigmas(roof, inner, outer, site, k, anchored)
         sides = read_sides(roof, k, axes, anchored, sigmas)
         if is_cut:
-            sides = cut_sides(sides, shapely.get_coordinates(polygons) @ axes.T)
-        planes = read_planes(roof, k, axes, covariance)
+            sides = cut_sides(sides, shapely.get_coordinates(polygons), axes, outline)
+        planes = read_planes(free, k, axes, covariance)
         local = [shapely.transform(polygon, plan.frame.xy_local) for polygon in polygons]
         local_axes = axes @ plan.frame.rotation
         parts.append(name_planes(planes, sides, local_axes, local, plan.frame, types))

@@ -10,6 +10,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+import shapely
 
 from ..union.volumes import LEVEL
 from .parts import GIVEN_M, STRAIGHT, OutlineWall, Planes, Side
@@ -75,14 +76,21 @@ def read_sides(
     return sides
 
 
-def cut_sides(sides: list[Side], corners: np.ndarray) -> list[Side]:
-    """Return sides of which those beyond the `corners` (n, 2) of a place end there."""
+def cut_sides(
+    sides: list[Side], corners: np.ndarray, axes: np.ndarray, outline: shapely.Polygon
+) -> list[Side]:
+    """Return sides of which those beyond the `corners` (n, 2) of a place end there.
+
+    Nothing determines the places of these ends but the outline, where they lie on it.
+    """
+    is_given = shapely.dwithin(shapely.points(corners), outline.boundary, GIVEN_M)
+    corners = corners @ axes.T
     lowest, highest = corners.min(axis=0), corners.max(axis=0)
     ends = [lowest[0], highest[0], lowest[1], highest[1]]
-    return [
-        side
-        if (1 if k % 2 else -1) * (end - side.offset - side.lean * corners[:, 1 - k // 2].mean())
-        > -GIVEN_M
-        else Side(float(end))
-        for k, (side, end) in enumerate(zip(sides, ends, strict=True))
-    ]
+    cut = list(sides)
+    for k, (side, end) in enumerate(zip(sides, ends, strict=True)):
+        place = side.offset + side.lean * corners[:, 1 - k // 2].mean()
+        if (1 if k % 2 else -1) * (end - place) <= -GIVEN_M:
+            is_end = np.abs(corners[:, k // 2] - end) < GIVEN_M
+            cut[k] = Side(float(end), 0.0, True, 0.0 if is_given[is_end].all() else math.inf)
+    return cut

@@ -22,12 +22,6 @@ HIDDEN_SHARE = 0.8
 APEX_M = 0.15  # A hip whose pairs of sides meet at heights so near each other (m) is a pyramid.
 STRAIGHT = 1e-9  # Directions (rad) that differ less are numerically the same.
 GIVEN_M = 1e-3  # A rectangle's end further (m) from its side lies on the outline that cuts it off.
-# Standard deviation (m) of a swath's place in plan, which no point of a building determines: roofs
-# lie so far beside their outline.
-REGISTERED_PLAN_M = 0.03
-# Standard deviation (m) of a swath's height, which no point of a building determines.
-REGISTERED_M = 0.01
-RAISED = np.array([[0.0], [0.0], [REGISTERED_M]])  # A plane (3, 1) changed by the latter.
 PROBE_M = 0.01  # Distance (m) that an end is moved to see which parameters depend on it.
 
 
@@ -35,9 +29,9 @@ PROBE_M = 0.01  # Distance (m) that an end is moved to see which parameters depe
 class Side:
     """A line x = offset + lean * y in the axes of its volume's direction.
 
-    x is across the side, y along it. If it is `anchored` to the outline, its eave is where the
-    outline is. `sigma` (m) is the standard deviation of its place. It is 0 where the outline gives
-    the place, and infinite where no points determine it or other volumes hide it.
+    x is across the side, y along it. If it is `anchored` to the outline, or to what cuts it off,
+    its eave is there. `sigma` (m) is the standard deviation of its place. It is 0 where the outline
+    gives the place, and infinite where no points determine it or other volumes hide it.
     """
 
     offset: float
@@ -92,45 +86,27 @@ def name_planes(
     corners = shapely.get_coordinates(regions) - frame.origin[:2]
     positions = np.column_stack([corners @ axes.T, np.ones(len(corners))])
     rows = np.where(find_visible_planes(planes.rows, positions)[:, None], planes.rows, np.nan)
-    registrations = measure_registration(planes, rows, positions)
     turn = measure_common_lean(rows)
     axes = np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]]) @ axes
     rows = turn_planes(rows, turn) + [0.0, 0.0, frame.origin[2]]
     sides = [turn_side(side, k, turn) for k, side in enumerate(sides)]
     ends = measure_rectangle(sides, corners @ axes.T)
     known_ends, probed_ends = list_moved_ends(sides, ends)
-    trial_ends = np.array([ends, ends, ends, *known_ends, *probed_ends]).T
+    modes = turn_planes(planes.modes, turn)
+    count = 2 + modes.shape[2]
+    trial_ends = np.array([ends] * count + known_ends + probed_ends).T
     all_rows = np.repeat(rows[:, :, None], trial_ends.shape[1], axis=2)
-    all_rows[:, :, 1:3] += turn_planes(registrations, turn)
+    all_rows[:, :, 2:count] += modes
     walls = tuple(wall._replace(facing=wall.facing - turn) for wall in planes.walls)
     hidden = [k for k, side in enumerate(sides) if side.sigma == math.inf and not side.anchored]
-    members = regularise(all_rows, trial_ends, math.atan2(axes[0, 1], axes[0, 0]), walls, hidden)
+    members = regularise(
+        all_rows, trial_ends, math.atan2(axes[0, 1], axes[0, 0]), walls, hidden, count
+    )
     member = members.those(0)
     turns = member.quarter_turns
-    modes = np.concatenate(
-        [turn_planes(planes.modes, turn), np.tile(RAISED, (len(rows), 1, 1))], axis=2
-    )
-    is_given = np.isfinite(rows[:, 2]) | (np.arange(len(rows)) <= LEVEL)  # visible cants only
-    changes = vary_member(members, modes[is_given]).turn(turns)
+    changes = members.those(list(range(1, trial_ends.shape[1]))).turn(turns)
     member = replace(member.turn(turns), centre=member.centre @ axes + frame.origin[:2])
     return member.part(regions, name_among(member.name, allowed), changes, len(probed_ends))
-
-
-def measure_registration(planes: Planes, rows: np.ndarray, positions: np.ndarray) -> np.ndarray:
-    """Return by how much (k, 3, 2) planes change if their swath lies off.
-
-    It is off by a standard deviation along u or along v. The visible planes (`rows`) are tied to
-    sides of the outline, and move over the corners `positions` (n, 3), u, v, 1, as far as these
-    ties allow.
-    """
-    is_present = np.isfinite(rows[:, 2])
-    if not rows[is_present, :2].any():  # level planes do not change
-        return np.zeros((len(rows), 3, 2))
-    design = (positions @ planes.design[is_present]).reshape(
-        is_present.sum() * len(positions), planes.design.shape[2]
-    )
-    shifted = -REGISTERED_PLAN_M * rows[is_present, :2].repeat(len(positions), axis=0)
-    return planes.design @ np.linalg.lstsq(design, shifted, rcond=None)[0]
 
 
 def find_visible_planes(rows: np.ndarray, positions: np.ndarray) -> np.ndarray:
@@ -227,9 +203,7 @@ def list_moved_ends(
     """
     middle, known_ends, probed_ends = (0.5 * (ends[0] + ends[1]), 0.5 * (ends[2] + ends[3])), [], []
     for k, side in enumerate(sides):
-        is_given = (
-            side.anchored or abs(ends[k] - side.offset - side.lean * middle[1 - k // 2]) > GIVEN_M
-        )
+        is_given = abs(ends[k] - side.offset - side.lean * middle[1 - k // 2]) > GIVEN_M
         if side.sigma == math.inf:
             probed_ends.append([*ends[:k], ends[k] + PROBE_M, *ends[k + 1 :]])
         elif not is_given and side.sigma > 0.0:
@@ -243,12 +217,14 @@ def regularise(
     kappa: float,
     walls: tuple[OutlineWall, ...] = (),
     hidden: Sequence[int] = (),
+    n_alike: int = 1,
 ) -> Member:
     """Make members over m rectangles with common eaves and apex where these are near.
 
     `ends` (4, m) are the lowest and highest u, v, and `rows` (5 and those over `walls`, 3, m) the
     planes, which all have the same sides. The first axis is at `kappa`. A side that lies `hidden`
-    takes the eave of the others, too.
+    takes the eave of the others, too. The first `n_alike` members have one rectangle and move its
+    sides alike, but for the second: it stays as its planes and its rectangle are.
     """
     centre, half = 0.5 * (ends[::2] + ends[1::2]), 0.5 * (ends[1::2] - ends[::2])
     planes = np.flatnonzero(np.isfinite(rows[: LEVEL + 1, 2, 0])).tolist()
@@ -267,7 +243,9 @@ def regularise(
         )
     top = rows[LEVEL, 2] if LEVEL in planes else np.full(count, np.inf)
     if sides:
-        centre, half, eaves = level_eaves(centre, half, eaves, slopes, leans, sides, hidden)
+        centre, half, eaves = level_eaves(
+            centre, half, eaves, slopes, leans, sides, hidden, n_alike
+        )
     return join_apex(
         Member(
             kappa,
@@ -278,7 +256,8 @@ def regularise(
             top,
             leans,
             measure_cants(rows[LEVEL + 1 :], walls, centre),
-        )
+        ),
+        n_alike,
     )
 
 
@@ -315,7 +294,8 @@ def level_eaves(
     slopes: np.ndarray,
     leans: np.ndarray,
     sides: list[int],
-    hidden: Sequence[int] = (),
+    hidden: Sequence[int],
+    n_alike: int,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Move `sides` out to the lowest eave's height, where that is near.
 
@@ -323,12 +303,18 @@ def level_eaves(
     other parts have no known place, and move from far, and inwards as well.
     """
     given_sides = [k for k in sides if k not in hidden] or sides
-    lowest, outwards, eaves = eaves[given_sides].min(axis=0), np.zeros_like(eaves), eaves.copy()
-    for k in sides:
+    outwards, eaves = np.zeros_like(eaves), eaves.copy()
+    lowest = eaves[given_sides].min(axis=0)
+    for k in given_sides:
         further = (eaves[k] - lowest) / slopes[k]
-        if k in given_sides:
-            outwards[k] = np.where(further < LEVEL_EAVE_M, further, 0.0)
-        else:
+        outwards[k] = np.where(further < LEVEL_EAVE_M, further, 0.0)
+        outwards[k, 1:n_alike] = outwards[k, 0]
+        outwards[k, 1:2] = 0.0
+    lower_eaves = (eaves - slopes * outwards)[given_sides, 1:n_alike]
+    lowest[1:n_alike] = lower_eaves.min(axis=0)
+    for k in sides:
+        if k not in given_sides:
+            further = (eaves[k] - lowest) / slopes[k]
             outwards[k] = np.where(np.abs(further) < HIDDEN_SHARE * half[k // 2], further, 0.0)
     low_shift, high_shift = outwards[::2], outwards[1::2]
     shift = 0.5 * (high_shift - low_shift)
@@ -338,29 +324,7 @@ def level_eaves(
     return centre + shift, half + 0.5 * (high_shift + low_shift), eaves
 
 
-def vary_member(members: Member, changes: np.ndarray) -> Member:
-    """Change the first of several members by each of `changes` (5 and cants, 3, p).
-
-    Its sides stay. The other members follow unchanged.
-    """
-    count = changes.shape[2]
-    varied = members.those([0] * count + list(range(1, members.eaves.shape[1])))
-    for k in members.sides:
-        axis = k // 2
-        middle = members.centre[:, 0].copy()  # becomes that of the side
-        middle[axis] -= SIGN[k] * members.half[axis, 0]
-        varied.slopes[k, :count] += SIGN[k] * changes[k, axis]
-        varied.eaves[k, :count] += (
-            changes[k, 0] * middle[0] + changes[k, 1] * middle[1] + changes[k, 2]
-        )
-    varied.top[:count] += changes[LEVEL, 2]
-    for k, plane in enumerate(changes[LEVEL + 1 :]):
-        facing, out = members.cants[:2, k, 0].tolist()
-        varied.cants[2:, k, :count] += measure_eave(plane, facing, out, members.centre[:, 0])
-    return varied
-
-
-def join_apex(members: Member) -> Member:
+def join_apex(members: Member, n_alike: int) -> Member:
     """Let the four planes of a hip meet in one point, if two pairs nearly do.
 
     The eaves stay.
@@ -369,6 +333,8 @@ def join_apex(members: Member) -> Member:
         return members
     apex, other_apex = members.apex(0), members.apex(1)
     is_near = (np.abs(apex - other_apex) <= APEX_M) & ~members.leans.any(axis=0)
+    is_near[1:n_alike] = is_near[0]
+    is_near[1:2] = False
     # A run is the distance from an eave to the point in plan.
     runs = (np.stack([apex, apex, other_apex, other_apex]) - members.eaves) / members.slopes
     return replace(
