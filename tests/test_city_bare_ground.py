@@ -31,10 +31,10 @@ def scan(has_house=True, density=6.0, seed=0):
     return np.column_stack([xy, z]), np.where(on_roof, 6, 2).astype(np.uint8)
 
 
-def run(folder, xyz, classes, **settings):
+def run(folder, xyz, classes, footprint=HOUSE, **settings):
     """The only building, as `folder` has it after a run, and the run's summary."""
     settings = Settings.from_dict({"reconstruct": settings})
-    rows, summary = run_points(folder, xyz, classes, {"a": HOUSE}, settings=settings)
+    rows, summary = run_points(folder, xyz, classes, {"a": footprint}, settings=settings)
     return rows["a"], summary
 
 
@@ -120,6 +120,16 @@ def test_heaps_of_the_building_class_on_bare_ground_are_no_building(tmp_path):
         record["status"] == "no_building"
         and "% of its points lie on the ground" in record["detail"]
     )
+
+
+@pytest.mark.parametrize("has_classes", [True, False])
+@pytest.mark.filterwarnings("ignore::hiproof.errors.InputWarning")
+def test_a_parcel_around_a_house_is_named(has_classes, tmp_path):
+    xyz, classes = scan()
+    parcel = shapely.box(X - 22, Y - 22, X + 38, Y + 34)
+    record, _ = run(tmp_path, xyz, classes if has_classes else np.ones_like(classes), parcel)
+    assert record["status"] == "no_building"
+    assert "if that is a house and the footprint its parcel, pass the outline" in record["detail"]
 
 
 class Level:

@@ -11,6 +11,7 @@ import numpy as np
 import shapely
 
 from ..frames import LocalFrame
+from ..geometry.grid import count_cells
 from ..geometry.point_in_polygon import find_inside
 from ..read.terrain import Terrain, TerrainChain
 from ..settings import Settings
@@ -23,6 +24,7 @@ DECK_M = 1.0
 the building.
 """
 
+LEAST_HOUSE_M2 = 20.0  # of points above the ground that may be a house inside its parcel
 ROOFED = 0.85
 """Share of the plan beside bare ground that points above the ground cover at least where a building
 stands around a yard: cleared sites with heaps and trees on them reach 0.72
@@ -66,6 +68,7 @@ def look_at_ground(
     standing = classify_standing(combined, plane)
     if standing.is_empty and not has_roofed_rest(combined, standing.is_low, outline):
         share = f"{100 * standing.low_share:.0f} % of its points lie on the ground"
+        share += remark_parcel(points[~standing.is_low[: len(points)]])
         if settings.reconstruct.empty_footprints == "skip":
             return Site(
                 points,
@@ -80,6 +83,17 @@ def look_at_ground(
     )  # so many are the cloud's ground, fewer the feet of walls
     return cut_bare_ground(
         selection, outline, np.concatenate([ground, points[lower]]), settings, points[~lower]
+    )
+
+
+def remark_parcel(upper: np.ndarray) -> str:
+    """Return a remark where `upper` points (n, 3) above the ground cover as much as a house."""
+    area_m2 = count_cells(np.floor(upper[:, :2]))
+    if area_m2 < LEAST_HOUSE_M2:
+        return ""
+    return (
+        f", and points above it cover {area_m2} m2; if that is a house and the footprint its "
+        "parcel, pass the outline of the house"
     )
 
 

@@ -24,18 +24,15 @@ class FoundRoof:
     """`points` (n, 3) of a roof, and what is known of it.
 
     `remark` says what hides it, `is_seen` whether enough of it is there to be modelled; `ground`
-    (m, 3) are points on the ground inside the outline.
+    (m, 3) are points on the ground inside the outline, and `is_ground` says whether the points that
+    are no roof are these.
     """
 
     points: np.ndarray
     remark: str = ""
     is_seen: bool = True
     ground: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
-
-    @property
-    def is_ground(self) -> bool:
-        """Whether the points that are no roof are the ground."""
-        return self.remark.endswith("ground")
+    is_ground: bool = False
 
 
 def found_roof(
@@ -50,6 +47,7 @@ def found_roof(
     """
     from ...classify import roof_points
     from ...classify.surfaces import thin_to_voxels
+    from ...fit.site import remark_parcel
 
     inside = shapely.intersects_xy(area, nearby[:, 0], nearby[:, 1])
     if not inside.any():
@@ -63,13 +61,15 @@ def found_roof(
     ground = nearby[inside & ~is_high]
     text = "leaves" if upper > 0.5 * (1 + roof) else "ground"
     if roof < HARDLY:
-        return FoundRoof(nearby[inside], f"no roof seen: its points are {text}", False, ground)
+        parcel = remark_parcel(nearby[inside & is_roof]) if text == "ground" else ""
+        remark = f"no roof seen: its points are {text}{parcel}"
+        return FoundRoof(nearby[inside], remark, False, ground, text == "ground")
     if roof < MOSTLY:
         remark = (
             f"mostly not seen: only {100 * roof:.0f} % of what lies inside the outline is roof, "
             f"the rest {text}"
         )
-        return FoundRoof(nearby[inside & is_roof], remark, ground=ground)
+        return FoundRoof(nearby[inside & is_roof], remark, True, ground, text == "ground")
     return FoundRoof(nearby[inside & is_roof], ground=ground)
 
 
