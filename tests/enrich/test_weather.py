@@ -148,6 +148,16 @@ def test_days_that_repeat_another_come_with_a_warning(source, first, count, tmp_
         make_sky(*DELFT, 0.0, 0.0, str(tmp_path / "a.epw"))
 
 
+def test_hours_that_stay_the_same_come_with_a_warning(tmp_path):
+    def change(columns):
+        for name in ("ghi", "dhi", "dni"):
+            columns[name].reshape(365, 24)[180, 12:16] = columns[name].reshape(365, 24)[180, 12]
+
+    write_epw(tmp_path / "a.epw", change=change)
+    with pytest.warns(InputWarning, match="for four hours or more, first on 30 June, 12:30"):
+        make_sky(*DELFT, 0.0, 0.0, str(tmp_path / "a.epw"))
+
+
 @settings(max_examples=20, deadline=None)
 @given(
     latitude=st.floats(-65, 65),

@@ -46,6 +46,7 @@ BRIGHTEST, LEAST_BRIGHTNESS = 0.99, 0.5
 """Quantile of the hours with a high sun, and the share of the radiation above the atmosphere that
 it has to reach: clear skies let 0.7 to 0.8 pass, and every climate has clear hours.
 """
+LEAST_STUCK_WM2 = 50.0  # W/m2; in whole ones, winter days of the north have less in equal hours
 FEWEST_EQUAL = 8  # hours with sun from which on two days that are alike in all are copies
 DAYLIGHT_RISE = 0.25  # sine of the sun's elevation (15 degrees) at noon from which no day is dark
 
@@ -243,6 +244,7 @@ def refuse_other_sun(weather: Weather, path: str) -> None:
     brightness = float(np.quantile((ghi / ceiling)[is_high] / rise[is_high], BRIGHTEST))
     warn_of_dull_sun(path, float(dhi.sum()) / total, brightness)
     warn_of_copied_days(weather, path)
+    warn_of_stuck_hours(weather, path)
 
 
 def warn_of_dull_sun(path: str, diffuse_share: float, brightness: float) -> None:
@@ -279,6 +281,20 @@ def warn_of_copied_days(weather: Weather, path: str) -> None:
             f"repeats the radiation of an earlier day on {count_things(len(copies), 'day')}, first "
             f"that of {source} on {copy}; check that days were not copied, and use another file if "
             "they were",
+        )
+
+
+def warn_of_stuck_hours(weather: Weather, path: str) -> None:
+    """Warn of radiation that stays the same while the sun moves on."""
+    hours = weather.values[["ghi", "dhi", "dni"]].to_numpy(float)
+    is_same = (hours[1:] == hours[:-1]).all(axis=1) & (hours[1:, 0] >= LEAST_STUCK_WM2)
+    is_stuck = is_same[:-2] & is_same[1:-1] & is_same[2:]
+    if is_stuck.any():
+        warn(
+            path,
+            f"holds the same radiation for four hours or more, first on "
+            f"{weather.times[is_stuck.argmax()]:%d %B, %H:%M}; check that its instrument did not "
+            "stand still, and use another file if it did",
         )
 
 
