@@ -24,7 +24,11 @@ DECK_M = 1.0
 the building.
 """
 
-LEAST_HOUSE_M2 = 20.0  # of points above the ground that may be a house inside its parcel
+LEAST_HOUSE_M2, MOST_OF_PARCEL = 20.0, 0.2
+"""Area (m2) of points above the ground from which on they may be a house, and the share of a
+parcel up to which it covers that: a roof over more of it is modelled.
+"""
+
 ROOFED = 0.85
 """Share of the plan beside bare ground that points above the ground cover at least where a building
 stands around a yard: cleared sites with heaps and trees on them reach 0.72
@@ -68,7 +72,7 @@ def look_at_ground(
     standing = classify_standing(combined, plane)
     if standing.is_empty and not has_roofed_rest(combined, standing.is_low, outline):
         share = f"{100 * standing.low_share:.0f} % of its points lie on the ground"
-        share += remark_parcel(points[~standing.is_low[: len(points)]])
+        share += remark_parcel(points[~standing.is_low[: len(points)]], outline)
         if settings.reconstruct.empty_footprints == "skip":
             return Site(
                 points,
@@ -86,10 +90,10 @@ def look_at_ground(
     )
 
 
-def remark_parcel(upper: np.ndarray) -> str:
-    """Return a remark where `upper` points (n, 3) above the ground cover as much as a house."""
+def remark_parcel(upper: np.ndarray, outline: shapely.Geometry) -> str:
+    """Return a remark where `upper` points (n, 3) cover as much as a house, and little in all."""
     area_m2 = count_cells(np.floor(upper[:, :2]))
-    if area_m2 < LEAST_HOUSE_M2:
+    if not LEAST_HOUSE_M2 <= area_m2 < MOST_OF_PARCEL * outline.area:
         return ""
     return (
         f", and points above it cover {area_m2} m2; if that is a house and the footprint its "

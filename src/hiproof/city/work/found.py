@@ -61,7 +61,7 @@ def found_roof(
     ground = nearby[inside & ~is_high]
     text = "leaves" if upper > 0.5 * (1 + roof) else "ground"
     if roof < HARDLY:
-        parcel = remark_parcel(nearby[inside & is_roof]) if text == "ground" else ""
+        parcel = remark_parcel(nearby[inside & is_roof], area) if text == "ground" else ""
         remark = f"no roof seen: its points are {text}{parcel}"
         return FoundRoof(nearby[inside], remark, False, ground, text == "ground")
     if roof < MOSTLY:
