@@ -17,7 +17,7 @@ from ...geometry.arrays import compute_median, copy_row, copy_rows, list_distinc
 from .prices import KIND_COST
 
 MAX_SLOPE = 2.5  # Steepest slope (rise over run), 68 degrees.
-MIN_AXIS_SLOPE = 0.05  # A flatter plane (rise over run), 3 degrees, is level.
+MIN_AXIS_SLOPE = 0.01  # A flatter plane (rise over run), half a degree, is level.
 PART_PLANES = 5  # Most planes of one part.
 # Ridge that keeps the slope of a plane determined when its points lie on a line.
 SLOPE_RIDGE = 2e-4
