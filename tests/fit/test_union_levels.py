@@ -34,3 +34,17 @@ def test_boxes_that_touch_at_one_level_are_one_part(name, seed):
         same = abs(part.translation[2] - other.translation[2]) < 1e-6
         assert not (same and shared > 0.1)
     assert len(flat) == 2
+
+
+@pytest.mark.parametrize("pitch", [1.0, 2.0])
+def test_a_hall_and_its_annex_with_a_pitch_of_a_degree_are_not_level(pitch):
+    outline, slope, found = shapely.box(0, 0, 45, 19), np.tan(np.radians(pitch)), 0
+
+    def height(x, y):
+        return np.where(y > 5.0, 6.5 + slope * (7.0 - np.abs(y - 12.0)), 4.0 + slope * y)
+
+    for seed in range(20):
+        fit = fit_building(sample_heights(height, outline, 5.0, 0.02, seed), outline)
+        rises = {part.type: part.parameters.get("height") for part in fit.roof_parts}
+        found += rises == pytest.approx({"gable": 7.0 * slope, "monopitch": 5.0 * slope}, abs=0.03)
+    assert found >= 17

@@ -15,9 +15,9 @@ import numpy as np
 from ...compiled import compiled
 from ...geometry.arrays import compute_median, copy_row, copy_rows, list_distinct, sort_order
 from .prices import KIND_COST
+from .volumes import SLOPE_LOW
 
 MAX_SLOPE = 2.5  # Steepest slope (rise over run), 68 degrees.
-MIN_AXIS_SLOPE = 0.01  # A flatter plane (rise over run), half a degree, is level.
 PART_PLANES = 5  # Most planes of one part.
 # Ridge that keeps the slope of a plane determined when its points lie on a line.
 SLOPE_RIDGE = 2e-4
@@ -208,7 +208,7 @@ def fit_symmetric_gable(cloud, members, planes, tau):
             heights[1],
             product,
         )
-        if not ok or not MIN_AXIS_SLOPE < slope < MAX_SLOPE:
+        if not ok or not SLOPE_LOW < slope < MAX_SLOPE:
             return fitted, False
         fitted[:] = 0.0
         fitted[0, k], fitted[0, 2], fitted[1, k], fitted[1, 2] = (
@@ -372,7 +372,7 @@ def append_pair_slopes(cloud, i, j, out, m):
     for axis in range(2):
         x = cloud.u if axis == 0 else cloud.v
         dx = x[j] - x[i]
-        if abs(dx) > 0.7 and MIN_AXIS_SLOPE < abs(dz / dx) < MAX_SLOPE:
+        if abs(dx) > 0.7 and SLOPE_LOW < abs(dz / dx) < MAX_SLOPE:
             out[m, axis] = dz / dx
             out[m, 2] = cloud.z[i] - dz / dx * x[i]
             m += 1
@@ -612,7 +612,7 @@ def fit_template(z, drop, slope, tau):
             return height, 0.0
         slope = -(n * sxy - sx * sy) / determinant
         height = (sy + slope * sx) / n
-        if not MIN_AXIS_SLOPE < slope < MAX_SLOPE:
+        if not SLOPE_LOW < slope < MAX_SLOPE:
             return height, 0.0
     return height, slope
 

@@ -39,7 +39,7 @@ LEVEL = 4  # Number of the level plane.
 FREE = 0.0  # The tie under which no slopes are equal.
 OPPOSITE = 1.0  # The tie under which slopes that face each other are equal.
 ALL_EQUAL = 2.0  # The tie under which all slopes are equal.
-SLOPE_LOW = 0.008  # A flatter slope (rise over run), half a degree, is level.
+SLOPE_LOW = 0.01  # A flatter slope (rise over run), half a degree, is level.
 SLOPE_HIGH = 2.75  # A steeper slope (rise over run), 70 degrees, is a wall.
 # Share of the extent of all places up to which those of a strip are looked at one after another. Of
 # wider ones, all are looked at, several at once.
