@@ -13,7 +13,7 @@ from hiproof.fit.roof.draw import (
     draw_whole_roof,
     make_drawing,
 )
-from hiproof.fit.roof.moves import LEAVE_OUT, MOVE_COLUMNS, list_moves
+from hiproof.fit.roof.moves import ALL_MOVES, LEAVE_OUT, MOVE_COLUMNS, list_moves
 from hiproof.fit.roof.price import know, price_roof
 from hiproof.fit.roof.regions import split_region
 from hiproof.fit.roof.site import make_site, split_convex
@@ -55,7 +55,7 @@ def begin_roof(kind, seed=0):
 
 def list_all_moves(roof, site):
     moves = np.empty((5000, MOVE_COLUMNS), np.int64)
-    return moves[: list_moves(roof, site, np.ones(len(roof.sides), bool), moves)]
+    return moves[: list_moves(roof, site, np.full(len(roof.sides), ALL_MOVES), moves)]
 
 
 def add_copy(roof):

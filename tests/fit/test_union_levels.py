@@ -48,3 +48,17 @@ def test_a_hall_and_its_annex_with_a_pitch_of_a_degree_are_not_level(pitch):
         rises = {part.type: part.parameters.get("height") for part in fit.roof_parts}
         found += rises == pytest.approx({"gable": 7.0 * slope, "monopitch": 5.0 * slope}, abs=0.03)
     assert found >= 17
+
+
+
+
+def test_parapets_a_hand_wide_are_no_parts():
+    outline, whole = shapely.box(0, 0, 14, 10), 0
+
+    def height(x, y):
+        return np.where(np.minimum(x, y) < 0.3, 7.0, np.where(x > 9.0, 4.0, 6.0))
+
+    for seed in range(20):
+        fit = fit_building(sample_heights(height, outline, 4.0, 0.03, seed), outline)
+        whole += all(min(part.parameters.values()) > 1.0 for part in fit.roof_parts)
+    assert whole >= 17

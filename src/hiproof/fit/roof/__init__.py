@@ -4,7 +4,8 @@ A roof is four small tables (lines, unknowns, planes, volumes) that share what i
 is the misfit of every point and what its exact drawing costs. Moves propose, `accept` judges.
 
 tables      the state
-draw        compiled: the exact plan of a roof, its corners and low steps
+draw        compiled: the exact plan of a roof, and its corners
+steps       compiled: what its steps cost
 price       compiled: the price of a roof in a box, and the fit of its unknowns
 ends        compiled: where the points say that a volume ends
 moves       compiled: moves of a roof, which propose and do not judge

@@ -10,8 +10,18 @@ from __future__ import annotations
 import numpy as np
 
 from ...compiled import compiled
+from ..prices import NARROW_M
 from .draw import is_near, widen_box
-from .moves import MOVE_COLUMNS, SHARE, TO_POINTS, apply_move, list_moves
+from .moves import (
+    ALL_MOVES,
+    MOVE_COLUMNS,
+    NO_MOVES,
+    SHARE,
+    SHARES_ONLY,
+    TO_POINTS,
+    apply_move,
+    list_moves,
+)
 from .price import (
     count_known_units,
     fit_unknowns,
@@ -25,10 +35,15 @@ from .price import (
     price_misfit,
     price_roof,
     price_tables,
+    price_widths,
+    widen,
 )
 from .tables import VOLUME_COUNT, copy_tables, has_room, pack, place_planes
 
 CHANGE_MARGIN_M = 0.5  # Distance (m) beyond what a move touches in which corners may change.
+BESIDE_M = (
+    NARROW_M - CHANGE_MARGIN_M + 0.02
+)  # Distance (m) beyond these in which steps may cost more.
 FIT_ROUNDS = 2  # Rounds of fitting and choosing points again.
 LEAST_UNITS = 0.05  # What a move must save: fitting again alone saves less.
 HOPE_UNITS = 2.0  # What fitting may still save of a move that does not pay before it.
@@ -68,7 +83,8 @@ def try_move(roof, trial, move, site, drawing, known, changed, box, exact):
     view, points = list_view(trial, box), list_points(site, box)
     if len(view) == 0:
         return 0.0
-    units, weight = count_known_units(known, box), 1.0
+    units, weight = count_known_units(known, widen(box, BESIDE_M)), 1.0
+    units += price_widths(roof, trial, site) - price_widths(trial, roof, site)
     if len(points) > FIRST_JUDGES and not exact and move[0] != SHARE and move[0] != TO_POINTS:
         step = 1 + (len(points) - 1) // FIRST_JUDGES
         weight, points = len(points) / len(points[::step]), points[::step].copy()
@@ -90,7 +106,9 @@ def judge(trial, site, drawing, view, box, points, weight, costs, units):
     new_misfit = weight * price_misfit(trial, site, view, points)
     if new_misfit >= limit:
         return 0.0
-    return limit - new_misfit - site.unit * price_drawing(trial, drawing, view, site, box)
+    return (
+        limit - new_misfit - site.unit * price_drawing(trial, drawing, site, widen(box, BESIDE_M))
+    )
 
 
 @compiled
@@ -108,6 +126,19 @@ def fit_roof(roof, site, rounds):
 
 
 @compiled
+def note_touched(roof, trial, changed, is_share, touched):
+    """Note in `touched` (v,) which moves to try again beside a move that was taken."""
+    for k in range(trial.counts[VOLUME_COUNT]):
+        if not changed[k]:
+            continue
+        touched[k] = max(touched[k], SHARES_ONLY if is_share else ALL_MOVES)
+        if trial.n_planes[k] == 0:  # what is left out leaves its place to those around it
+            for j in range(trial.counts[VOLUME_COUNT]):
+                if is_near(trial.boxes[j], roof.boxes[k], CHANGE_MARGIN_M):
+                    touched[j] = ALL_MOVES
+
+
+@compiled
 def improve(roof, trial, site, drawing, asked, rounds):
     """Improve a roof by moves that concern volumes `asked` (v,), until none saves.
 
@@ -115,7 +146,7 @@ def improve(roof, trial, site, drawing, asked, rounds):
     """
     size = len(roof.sides)
     changed, box = np.zeros(size, np.bool_), np.empty(4)
-    touched = np.zeros(size, np.bool_)
+    questions, touched = np.where(asked, ALL_MOVES, NO_MOVES), np.zeros(size, np.int64)
     moves, gains = np.empty((MOST_MOVES, MOVE_COLUMNS), np.int64), np.empty(MOST_MOVES)
     lowest, least = np.inf, LEAST_UNITS * site.unit
     for _ in range(rounds):
@@ -125,32 +156,27 @@ def improve(roof, trial, site, drawing, asked, rounds):
         if price > lowest - least:
             return price
         lowest = price
-        count = list_moves(roof, site, asked, moves)
+        count = list_moves(roof, site, questions, moves)
         for m in range(count):
             gains[m] = try_move(roof, trial, moves[m], site, drawing, known, changed, box, False)
         order = np.argsort(-gains[:count])
-        touched[:] = False
+        touched[:] = NO_MOVES
         for q in range(count):
             m = order[q]
             if gains[m] <= least:
                 break
             if try_move(roof, trial, moves[m], site, drawing, known, changed, box, True) <= least:
                 continue
-            touched |= changed
-            # what is left out leaves its place to those around it
-            for k in range(roof.counts[VOLUME_COUNT]):
-                if changed[k] and trial.n_planes[k] == 0:
-                    for j in range(trial.counts[VOLUME_COUNT]):
-                        touched[j] |= is_near(trial.boxes[j], roof.boxes[k], CHANGE_MARGIN_M)
+            note_touched(roof, trial, changed, moves[m, 0] == SHARE, touched)
             copy_tables(trial, roof)
-            known = know_change(roof, drawing, site, box, known)
+            known = know_change(roof, drawing, site, box, widen(box, BESIDE_M), known)
         if not touched.any():
             return price
         place = 0
         for k in range(roof.counts[VOLUME_COUNT]):
             if roof.n_planes[k] > 0:
-                asked[place] = touched[k]
+                questions[place] = touched[k]
                 place += 1
-        asked[place:] = False
+        questions[place:] = NO_MOVES
         pack(roof)
     return price_roof(roof, drawing, site)

@@ -24,11 +24,8 @@ ONE_PLACE_M = 0.01  # Corners nearer than this (m) are one.
 STRAIGHT_RAD = 0.0175  # Angle (rad): a corner turns by more than a degree.
 ONE_LEVEL_M = 0.03  # Corners of one place whose heights differ less (m) are one.
 MOST_AT_PLACE = 64  # Most planes that meet in one place.
-LOW_STEP_TOP_M = 0.5  # Steps lower than this (m) cost by the metre.
 SEEN_STEP_M = 0.05  # Lower steps (m) are within what two strips differ by.
 SHARED_BORDER_M = 0.1  # Shortest stretch (m) of border that two fragments share.
-STEP_SAMPLE_M = 0.5  # Distance (m) of the places in which the height of a step is measured.
-EDGE_OFFSET_M = 0.01  # Distance (m) from an edge in which the roof beside it is measured.
 
 Drawing = namedtuple(
     "Drawing", "count rings sizes owners numbers boxes scratch halves pieces notes"
@@ -495,58 +492,6 @@ def compute_heights(roof, view, x, y, reach, heights, volumes):
             is_seen = (z[i] > highest[i]) | (replaces & (z[i] > -np.inf))
             highest[i] = z[i] if is_seen else highest[i]
             owners[i] = k if is_seen else owners[i]
-
-
-@compiled
-def list_low_steps(roof, drawing, view, box):
-    """Return the stretches (n, 3) of low steps in a `box`: x and y of a middle, and the length.
-
-    Edges are cut at multiples of a length from the foot of the line that they lie on, so that one
-    stretch is the same however far a fragment reaches.
-    """
-    xs, ys, tops, lengths = sample_edges(roof, drawing, box)
-    heights, out, total = np.empty(len(xs)), np.empty((len(xs), 3)), 0
-    compute_heights(roof, view, xs, ys, 0.0, heights, np.empty(len(xs), np.int64))
-    for i in range(len(xs)):
-        if SEEN_STEP_M < tops[i] - heights[i] < LOW_STEP_TOP_M:
-            out[total, 0], out[total, 1], out[total, 2] = xs[i], ys[i], lengths[i]
-            total += 1
-    return out[:total]
-
-
-@compiled
-def sample_edges(roof, drawing, box):
-    """Return places x, y (n,) just outside the fragments' edges in a box.
-
-    With them come the fragments' heights there, and the lengths (m) of the stretches.
-    """
-    most = 0
-    for f in range(drawing.count[0]):
-        around = 2.0 * (drawing.boxes[f, 1] - drawing.boxes[f, 0])
-        around += 2.0 * (drawing.boxes[f, 3] - drawing.boxes[f, 2])
-        most += 2 * drawing.sizes[f] + int(around / STEP_SAMPLE_M)
-    xs, ys, tops, lengths, count = np.empty(most), np.empty(most), np.empty(most), np.empty(most), 0
-    for f in range(drawing.count[0]):
-        size, row = drawing.sizes[f], roof.planes[drawing.owners[f, 0], drawing.owners[f, 1]]
-        x0, y0 = drawing.rings[f, size - 1, 0], drawing.rings[f, size - 1, 1]
-        for i in range(size):
-            x1, y1 = drawing.rings[f, i, 0], drawing.rings[f, i, 1]
-            length = np.sqrt((x1 - x0) ** 2 + (y1 - y0) ** 2)
-            if length > 2.0 * ONE_PLACE_M:
-                a, b = (x1 - x0) / length, (y1 - y0) / length
-                start = a * x0 + b * y0
-                first, last = np.floor(start / STEP_SAMPLE_M), (start + length) / STEP_SAMPLE_M
-                for q in range(int(np.ceil(last) - first)):
-                    low = max(STEP_SAMPLE_M * (first + q) - start, 0.0)
-                    high = min(STEP_SAMPLE_M * (first + q + 1.0) - start, length)
-                    t = 0.5 * (low + high)
-                    x, y = x0 + t * a + EDGE_OFFSET_M * b, y0 + t * b - EDGE_OFFSET_M * a
-                    if box[0] < x < box[1] and box[2] < y < box[3]:
-                        xs[count], ys[count], lengths[count] = x, y, high - low
-                        tops[count] = row[0] * x + row[1] * y + row[2]
-                        count += 1
-            x0, y0 = x1, y1
-    return xs[:count], ys[:count], tops[:count], lengths[:count]
 
 
 @compiled

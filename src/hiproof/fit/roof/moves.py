@@ -52,6 +52,8 @@ from .tables import (
     TO_POINTS,  # side b of volume a where points say that it ends, as it leans
 ) = range(18)
 MOVE_COLUMNS = 5  # Numbers of a move: its kind and four more.
+# What to try of a volume. One whose unknowns are shared is where it was.
+NO_MOVES, SHARES_ONLY, ALL_MOVES = range(3)
 # Planes face square to their sides, along the axis between two sides, or square to either.
 FACE_SIDES, FACE_AXIS, FACE_FIRST, FACE_SECOND = 1, 2, 3, 4
 
@@ -82,10 +84,10 @@ def write_move(moves, count, kind, a, b, c, d):
 
 @compiled
 def list_moves(roof, site, asked, moves):
-    """Write the moves that concern a volume in `asked` (v,) to `moves`. Returns their number."""
+    """Write the moves that are `asked` (v,) of volumes to `moves`. Returns their number."""
     count = 0
     for k in range(roof.counts[VOLUME_COUNT]):
-        if not asked[k] or roof.n_planes[k] == 0:
+        if asked[k] < ALL_MOVES or roof.n_planes[k] == 0:
             continue
         box = roof.boxes[k]
         count = write_move(moves, count, LEAVE_OUT, k, 0, 0, 0)
@@ -111,7 +113,7 @@ def list_moves(roof, site, asked, moves):
         for way in range(4 if cuts > 0 and not site.keeps_shapes else 2):
             count = write_move(moves, count, LEVEL_EAVES, k, way % 2, way // 2, 0)
         for j in range(roof.counts[VOLUME_COUNT]):
-            if j == k or roof.n_planes[j] == 0 or (j > k and asked[j]):
+            if j == k or roof.n_planes[j] == 0 or (j > k and asked[j] == ALL_MOVES):
                 continue
             if is_near(roof.boxes[j], box, NEIGHBOUR_M):
                 count = list_merges(roof, site, j, k, moves, count)
@@ -181,7 +183,7 @@ def list_shares(roof, site, asked, moves, count):
                     continue
                 widen_box(boxes[u], roof.boxes[k])
                 kinds[u] = kind
-                is_asked[u] |= asked[k]
+                is_asked[u] |= asked[k] > NO_MOVES
     order = np.argsort(roof.values[:n])
     for i in range(n):
         found = 0

@@ -13,14 +13,26 @@ import numpy as np
 from ...compiled import compiled
 from ..prices import (
     CORNER_UNITS,
-    LOW_STEP_UNITS,
+    GIVEN_UNITS,
+    LACK_UNITS,
+    NARROW_M,
     SKEW_UNITS,
     SMALL_GAP_POINTS,
     UNKNOWN_UNITS,
     VOLUME_UNITS,
 )
 from ..union.objective import compute_cell_cost, compute_point_cost
-from .draw import compute_heights, draw, is_near, list_corners, list_low_steps
+from .draw import (
+    RING_CORNERS,
+    compute_heights,
+    copy_ring,
+    cut,
+    draw,
+    is_near,
+    list_corners,
+    meets,
+)
+from .steps import list_steps
 from .tables import LINE_COUNT, N_SIDES, ONE_PLANE, UNKNOWN_COUNT, VOLUME_COUNT, place_planes
 
 OVER_M = 0.03  # Points so far (m) beside a volume are over it.
@@ -30,7 +42,7 @@ DAMPING = 0.05  # Points that hold an unknown at its value.
 Site = namedtuple(
     "Site",
     "x y z weight shade n low high dead width unit parts part_sizes part_boxes lines bays "
-    "bay_heights bounds keeps_shapes",
+    "bay_heights bounds narrow keeps_shapes",
 )
 """What the roof of a building has to explain.
 
@@ -42,6 +54,7 @@ Site = namedtuple(
 - lines (m, 6): lines of the outline, as `site.list_outline_lines` says.
 - bays (b, 4, 3), bay_heights (b,): sides and heights of places that a wall cuts off.
 - bounds (4,): least and greatest x and y of the outline.
+- narrow: a volume is narrow below this width (m).
 - keeps_shapes: whether volumes keep their planes, because not all types may be built.
 """
 
@@ -49,7 +62,7 @@ Known = namedtuple("Known", "costs corners steps units")
 """What is known of a roof as it is.
 
 What each point and cell costs (n + g,), where its corners (c, 2) and low steps (s, 3) are, and the
-units (1,) of its tables.
+units (2,) of its tables and of what its volumes lack in width.
 """
 
 
@@ -114,11 +127,18 @@ def price_misfit(roof, site, view, points):
 
 
 @compiled
-def price_drawing(roof, drawing, view, site, box):
-    """Return the units of the corners and low steps that are drawn in a box."""
-    draw(roof, drawing, view, site, box)
-    steps = list_low_steps(roof, drawing, view, box)
-    return CORNER_UNITS * len(list_corners(roof, drawing, box)) + LOW_STEP_UNITS * steps[:, 2].sum()
+def price_drawing(roof, drawing, site, box):
+    """Return the units of the corners and steps that are drawn in a box."""
+    corners, steps = draw_structure(roof, drawing, site, box)
+    return CORNER_UNITS * len(corners) + steps[:, 2].sum()
+
+
+@compiled
+def draw_structure(roof, drawing, site, box):
+    """Draw a box. Returns its corners (c, 2), and its steps (s, 3) with what they cost (units)."""
+    draw(roof, drawing, list_view(roof, box), site, box)
+    corners, view = list_corners(roof, drawing, box), list_view(roof, widen(box, NARROW_M))
+    return corners, list_steps(roof, drawing, view, site, box)
 
 
 @compiled
@@ -148,6 +168,54 @@ def price_tables(roof):
 
 
 @compiled
+def widen(box, reach):
+    return np.array([box[0] - reach, box[1] + reach, box[2] - reach, box[3] + reach])
+
+
+@compiled
+def price_widths(roof, other, site):
+    """Return the units of what a roof's volumes lack in width, but those with sides as in `other`.
+
+    Volumes of one number are compared.
+    """
+    total = 0.0
+    for k in range(roof.counts[VOLUME_COUNT]):
+        is_same = k < other.counts[VOLUME_COUNT] and other.n_planes[k] > 0
+        for s in range(N_SIDES):
+            is_same &= roof.sides[k, s] == other.sides[k, s]
+        if roof.n_planes[k] > 0 and not is_same:
+            total += price_lack(roof, k, site)
+    return total
+
+
+@compiled
+def price_lack(roof, k, site):
+    """Return the units of what volume k lacks in width inside the outline."""
+    plan, room = np.empty((RING_CORNERS, 2)), np.empty((RING_CORNERS, 2))
+    low, high = np.full(2, np.inf), np.full(2, -np.inf)
+    for part in range(len(site.part_sizes)):
+        box, size = site.part_boxes[part], site.part_sizes[part]
+        if not meets(roof.boxes[k], box[0], box[1], box[2], box[3]):
+            continue
+        copy_ring(site.parts[part], size, plan)
+        for s in range(N_SIDES):
+            half = roof.half_planes[k, s]
+            size = cut(plan, size, half[0], half[1], half[2], room)
+        for i in range(size):
+            for axis in range(2):
+                half = roof.half_planes[k, 2 * axis]
+                across = half[0] * plan[i, 0] + half[1] * plan[i, 1]
+                low[axis], high[axis] = min(low[axis], across), max(high[axis], across)
+    narrow = 0 if high[0] - low[0] < high[1] - low[1] else 1
+    first, second = abs(roof.sides[k, 2 * narrow]) - 1, abs(roof.sides[k, 2 * narrow + 1]) - 1
+    lack = site.narrow - (high[narrow] - low[narrow])
+    if not 0.0 < lack < site.narrow:
+        return 0.0
+    is_given = roof.lines[first, 3] + roof.lines[second, 3] == 0.0
+    return (GIVEN_UNITS if is_given else LACK_UNITS) * lack * (high[1 - narrow] - low[1 - narrow])
+
+
+@compiled
 def count_skew_planes(roof, k):
     """Count the planes of volume k that are nearly, but not quite, square to the first."""
     count, is_first, a, b, lines = 0, True, 0.0, 0.0, roof.lines
@@ -163,30 +231,41 @@ def count_skew_planes(roof, k):
 
 
 @compiled
+def price_all_units(roof, site):
+    """Return the units (2,) of a roof's tables and of what its volumes lack in width."""
+    lack = 0.0
+    for k in range(roof.counts[VOLUME_COUNT]):
+        lack += price_lack(roof, k, site) if roof.n_planes[k] > 0 else 0.0
+    return np.array([price_tables(roof), lack])
+
+
+@compiled
 def know(roof, drawing, site):
     """Return what is known of a roof."""
     box = np.array([-np.inf, np.inf, -np.inf, np.inf])
-    view = list_view(roof, box)
-    draw(roof, drawing, view, site, box)
+    corners, steps = draw_structure(roof, drawing, site, box)
     return Known(
-        compute_costs(roof, site, view, np.arange(len(site.x))),
-        list_corners(roof, drawing, box),
-        list_low_steps(roof, drawing, view, box),
-        np.array([price_tables(roof)]),
+        compute_costs(roof, site, list_view(roof, box), np.arange(len(site.x))),
+        corners,
+        steps,
+        price_all_units(roof, site),
     )
 
 
 @compiled
-def know_change(roof, drawing, site, box, known):
-    """Return what is known of a roof that has changed in a box."""
-    view, points = list_view(roof, box), list_points(site, box)
-    draw(roof, drawing, view, site, box)
-    known.costs[points] = compute_costs(roof, site, view, points)
+def know_change(roof, drawing, site, box, wide, known):
+    """Return what is known of a roof that has changed in a box.
+
+    In a `wide` one, its steps may cost more or less.
+    """
+    points = list_points(site, box)
+    known.costs[points] = compute_costs(roof, site, list_view(roof, box), points)
+    corners, steps = draw_structure(roof, drawing, site, wide)
     return Known(
         known.costs,
-        replace_inside(known.corners, list_corners(roof, drawing, box), box),
-        replace_inside(known.steps, list_low_steps(roof, drawing, view, box), box),
-        np.array([price_tables(roof)]),
+        replace_inside(known.corners, corners, wide),
+        replace_inside(known.steps, steps, wide),
+        price_all_units(roof, site),
     )
 
 
@@ -217,14 +296,15 @@ def count_known_units(known, box):
         corners += lies_in(known.corners, m, box)
     for m in range(len(known.steps)):
         length += known.steps[m, 2] if lies_in(known.steps, m, box) else 0.0
-    return known.units[0] + CORNER_UNITS * corners + LOW_STEP_UNITS * length
+    return known.units[0] + CORNER_UNITS * corners + length
 
 
 @compiled
 def price_known(known, site):
     """Return the price (points) of the roof that is known."""
     everywhere = np.array([-np.inf, np.inf, -np.inf, np.inf])
-    return known.costs.sum() + site.unit * count_known_units(known, everywhere)
+    units = count_known_units(known, everywhere) + known.units[1]
+    return known.costs.sum() + site.unit * units
 
 
 @compiled

@@ -7,7 +7,7 @@ from itertools import combinations, pairwise
 import numpy as np
 import shapely
 
-from ..prices import DEAD_M
+from ..prices import DEAD_M, NARROW_M
 from .draw import RING_CORNERS
 from .price import Site
 
@@ -63,6 +63,7 @@ def make_site(
         bays,
         heights,
         np.array([x0, x1, y0, y1]),
+        min(NARROW_M, 2.0 * outline.area / outline.length),  # a slender outline is as wide
         keeps_shapes,
     )
 

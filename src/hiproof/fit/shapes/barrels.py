@@ -14,7 +14,8 @@ from .accept import PartsRoof
 from .custom import fit_over
 from .regions import list_polygons, unite_outlines
 
-BARREL_LIKE = ("gable", "asymmetric_gable", "truncated_gable", "gambrel")  # What is made of one.
+# What is made of one.
+BARREL_LIKE = ("gable", "asymmetric_gable", "truncated_gable", "gambrel", "half_mansard")
 CURVE_ROUNDS = 2  # The second leaves out points beside the vault, such as those of a wall's top.
 BEND_NUMBERS = 1  # Points alone say that a roof of two slopes is bent: how much is one number.
 ENDS_M = 0.5  # Parts of one vault end within this distance (m) of each other.
