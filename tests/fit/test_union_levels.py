@@ -50,8 +50,6 @@ def test_a_hall_and_its_annex_with_a_pitch_of_a_degree_are_not_level(pitch):
     assert found >= 17
 
 
-
-
 def test_parapets_a_hand_wide_are_no_parts():
     outline, whole = shapely.box(0, 0, 14, 10), 0
 
