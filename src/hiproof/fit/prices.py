@@ -18,11 +18,10 @@ SKEW_UNITS = 0.1  # A plane that is not square to the first of its volume, but n
 LEAN_UNITS = 1.0  # A line with a direction of its own.
 CORNER_UNITS = 0.5  # A corner of the drawn roof, at any level.
 LOW_STEP_UNITS = 0.23  # A metre of a step lower than half a metre.
-# Nobody draws what is narrower than this (m).
-NARROW_M = 1.0
+NARROW_M = 1.0  # Nobody draws what is narrower (m).
 LACK_UNITS = 4.0  # A m2 that a volume lacks to be as wide: what its points would explain.
 GIVEN_UNITS = 1.0  # The same between two lines of the outline.
-NARROW_UNITS = 0.4  # A metre of a step beside a narrower strip, but of one along a wall.
+NARROW_UNITS = 0.4  # A metre of a step beside a narrower strip, unless it runs along a wall.
 
 # Where a side of a volume of the search begins: along no line of the outline, between two of its
 # corners, each metre off.

@@ -41,9 +41,8 @@ from .price import (
 from .tables import VOLUME_COUNT, copy_tables, has_room, pack, place_planes
 
 CHANGE_MARGIN_M = 0.5  # Distance (m) beyond what a move touches in which corners may change.
-BESIDE_M = (
-    NARROW_M - CHANGE_MARGIN_M + 0.02
-)  # Distance (m) beyond these in which steps may cost more.
+# Distance (m) beyond these in which steps may cost more, with what their middles are off them.
+BESIDE_M = NARROW_M - CHANGE_MARGIN_M + 0.02
 FIT_ROUNDS = 2  # Rounds of fitting and choosing points again.
 LEAST_UNITS = 0.05  # What a move must save: fitting again alone saves less.
 HOPE_UNITS = 2.0  # What fitting may still save of a move that does not pay before it.

@@ -267,6 +267,22 @@ def add_fragment(drawing, j, p, ring, size):
 
 
 @compiled
+def cut_part(roof, k, site, part, plan, room):
+    """Set the ring `plan` to what lies inside volume k's sides of a convex part of the outline.
+
+    `room` is for a ring. Returns how many corners the plan has.
+    """
+    size = site.part_sizes[part]
+    copy_ring(site.parts[part], size, plan)
+    for s in range(N_SIDES):
+        half = roof.half_planes[k, s]
+        size = cut(plan, size, half[0], half[1], half[2], room)
+        if size == 0:
+            break
+    return size
+
+
+@compiled
 def draw(roof, drawing, view, site, box):
     """Draw the volumes of `view` (m,) in the parts of the outline that reach into a `box` (4,)."""
     drawing.count[0] = 0
@@ -280,13 +296,7 @@ def draw(roof, drawing, view, site, box):
             j = view[m]
             if not meets(roof.boxes[j], bounds[0], bounds[1], bounds[2], bounds[3]):
                 continue
-            size = site.part_sizes[part]
-            copy_ring(site.parts[part], size, plan)
-            for s in range(N_SIDES):
-                half = roof.half_planes[j, s]
-                size = cut(plan, size, half[0], half[1], half[2], room)
-                if size == 0:
-                    break
+            size = cut_part(roof, j, site, part, plan, room)
             if size == 0 or measure_area(plan, size) < FRAGMENT_M2:
                 continue
             for p in range(roof.n_planes[j]):

@@ -25,8 +25,7 @@ from ..union.objective import compute_cell_cost, compute_point_cost
 from .draw import (
     RING_CORNERS,
     compute_heights,
-    copy_ring,
-    cut,
+    cut_part,
     draw,
     is_near,
     list_corners,
@@ -61,8 +60,8 @@ Site = namedtuple(
 Known = namedtuple("Known", "costs corners steps units")
 """What is known of a roof as it is.
 
-What each point and cell costs (n + g,), where its corners (c, 2) and low steps (s, 3) are, and the
-units (2,) of its tables and of what its volumes lack in width.
+What each point and cell costs (n + g,), where its corners (c, 2) are, its steps (s, 3) with the
+units of each, and the units (2,) of its tables and of what its volumes lack in width.
 """
 
 
@@ -194,14 +193,10 @@ def price_lack(roof, k, site):
     plan, room = np.empty((RING_CORNERS, 2)), np.empty((RING_CORNERS, 2))
     low, high = np.full(2, np.inf), np.full(2, -np.inf)
     for part in range(len(site.part_sizes)):
-        box, size = site.part_boxes[part], site.part_sizes[part]
+        box = site.part_boxes[part]
         if not meets(roof.boxes[k], box[0], box[1], box[2], box[3]):
             continue
-        copy_ring(site.parts[part], size, plan)
-        for s in range(N_SIDES):
-            half = roof.half_planes[k, s]
-            size = cut(plan, size, half[0], half[1], half[2], room)
-        for i in range(size):
+        for i in range(cut_part(roof, k, site, part, plan, room)):
             for axis in range(2):
                 half = roof.half_planes[k, 2 * axis]
                 across = half[0] * plan[i, 0] + half[1] * plan[i, 1]
@@ -290,13 +285,13 @@ def lies_in(rows, m, box):
 
 @compiled
 def count_known_units(known, box):
-    """Return the units of the tables, and of the known corners and low steps in a box."""
-    corners, length = 0, 0.0
+    """Return the units of the tables, and of the known corners and steps in a box."""
+    corners, steps = 0, 0.0
     for m in range(len(known.corners)):
         corners += lies_in(known.corners, m, box)
     for m in range(len(known.steps)):
-        length += known.steps[m, 2] if lies_in(known.steps, m, box) else 0.0
-    return known.units[0] + CORNER_UNITS * corners + length
+        steps += known.steps[m, 2] if lies_in(known.steps, m, box) else 0.0
+    return known.units[0] + CORNER_UNITS * corners + steps
 
 
 @compiled
