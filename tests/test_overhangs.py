@@ -17,7 +17,7 @@ from hiproof.settings import Settings
 from hiproof.write.building_attributes import building_attributes, measure_figures
 from hiproof.write.meshes.stl import STL_TRIANGLE
 from hiproof.write.parameters import building_record
-from written_run import require_valid_files, write_run
+from written_run import list_faults, write_run
 
 EAVES_M, GABLES_M, THICKNESS_M = 0.6, 0.4, 0.2
 
@@ -131,7 +131,7 @@ def test_every_file_is_valid_and_built_again(tmp_path):
         reconstruct("c", eaves=0.0, gables=0.0),
     ]
     write = {"citygml": "both", "lods": ["0", "1.2", "2.2", "2.3"]}
-    require_valid_files(tmp_path, houses, write)
+    assert list_faults(tmp_path, houses, write) == []
     lines = (tmp_path / "buildings.city.jsonl").read_text().splitlines()[1:]
     for line, house in zip(lines, houses, strict=True):
         geometries = json.loads(line)["CityObjects"][house.id]["geometry"]
@@ -167,7 +167,7 @@ def test_meshes_have_overhangs_where_the_run_asked_for_them(tmp_path, lods):
 @pytest.mark.parametrize("lods", [["2.3"], ["2.2", "2.3"]])
 def test_building_parts_have_valid_files_too(tmp_path, lods):
     write = {"lods": lods, "parts_as": "buildingparts"}
-    require_valid_files(tmp_path, [reconstruct("a")], write)
+    assert list_faults(tmp_path, [reconstruct("a")], write) == []
 
 
 def test_files_without_the_level_are_as_they_were(tmp_path):

@@ -1,6 +1,7 @@
 """Weather files: every format gives the same sun, and what does not fit is refused."""
 
 import tempfile
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -156,6 +157,32 @@ def test_hours_that_stay_the_same_come_with_a_warning(tmp_path):
     write_epw(tmp_path / "a.epw", change=change)
     with pytest.warns(InputWarning, match="for four hours or more, first on 30 June, 12:30"):
         make_sky(*DELFT, 0.0, 0.0, str(tmp_path / "a.epw"))
+
+
+@pytest.mark.parametrize(
+    "place, said, when",
+    [
+        ({"longitude": 4.36, "zone": 0}, {"longitude": -4.36}, "after"),
+        ({"longitude": -3.0, "zone": 0}, {"longitude": 3.0}, "before"),
+        ({"longitude": 77.2, "zone": 5.5}, {"zone": 5}, "before"),
+        ({"longitude": 77.2, "zone": 5.5}, {"zone": 6}, "after"),
+    ],
+    ids=["a sign lost", "a sign added", "India at 5 h", "India at 6 h"],
+)
+def test_a_sun_half_an_hour_off_comes_with_a_warning(place, said, when, tmp_path):
+    for folder, changes in (("right", {}), ("wrong", said)):
+        (tmp_path / folder).mkdir()
+        write_epw(tmp_path / folder / "a.epw", 30.0, **place)
+        text = (tmp_path / folder / "a.epw").read_text()
+        for name, value in changes.items():
+            text = text.replace(f",{place[name]},", f",{value},", 1)
+        (tmp_path / folder / "a.epw").write_text(text)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        read_year(str(tmp_path / "right/a.epw"))
+    assert not [w for w in caught if issubclass(w.category, InputWarning)]
+    with pytest.warns(InputWarning, match=f"fit the sun about half an hour {when} its times"):
+        read_year(str(tmp_path / "wrong/a.epw"))
 
 
 @settings(max_examples=20, deadline=None)

@@ -28,7 +28,12 @@ FARTHEST_STATION_KM = 300.0  # distance (km) beyond which weather says nothing o
 EARTH_RADIUS_KM = 6371.0  # mean radius
 PVGIS_CSV = "Latitude"  # beginning of PVGIS' tables; other tables are TMY3's
 MISSING_WM2 = 9999.0  # irradiance (W/m2) from which EPW calls a value missing; others use negatives
-SUN_MINUTES = (-20, 0, 20)  # times in an hour whose mean sun stands for that of the hour
+SUN_MINUTES = (-40, -20, 0, 20, 40)  # any three in a row give the mean sun of an hour
+MOVED, LEAST_MOVED = 0.6, 0.02
+"""Share of the gap between global radiation and its parts that is left 20 minutes on, below which
+the sun is 13 to 50 minutes off, and the least such gap, as a share of the year: 0.003 in pvlib's
+TMY3 files.
+"""
 GREATEST_EXCESS = 0.007
 """Share of a year's global radiation that may exceed what reaches the top of the atmosphere.
 
@@ -208,7 +213,8 @@ def refuse_missing_hours(weather: Weather, path: str) -> None:
 def refuse_other_sun(weather: Weather, path: str) -> None:
     """Raise InputError for radiation that does not fit the sun over the station."""
     ghi, dhi, dni = (weather.values[name].to_numpy(float) for name in ("ghi", "dhi", "dni"))
-    rise = measure_rise(weather)
+    rises = measure_rises(weather)
+    rise = rises[1]
     ceiling = import_pvlib().irradiance.get_extra_radiation(weather.times).to_numpy()
     got, total = "", max(float(ghi.sum()), 1.0)
     gaps, excess = np.abs(ghi - dhi - dni * rise), np.maximum(ghi - ceiling * rise, 0.0)
@@ -243,8 +249,8 @@ def refuse_other_sun(weather: Weather, path: str) -> None:
     is_high = rise > DAYLIGHT_RISE
     brightness = float(np.quantile((ghi / ceiling)[is_high] / rise[is_high], BRIGHTEST))
     warn_of_dull_sun(path, float(dhi.sum()) / total, brightness)
-    warn_of_copied_days(weather, path)
-    warn_of_stuck_hours(weather, path)
+    warn_of_moved_sun(weather, rises, path)
+    warn_of_repeated_hours(weather, path)
 
 
 def warn_of_dull_sun(path: str, diffuse_share: float, brightness: float) -> None:
@@ -264,9 +270,10 @@ def warn_of_dull_sun(path: str, diffuse_share: float, brightness: float) -> None
         )
 
 
-def warn_of_copied_days(weather: Weather, path: str) -> None:
-    """Warn of days whose radiation is that of an earlier day in every hour."""
-    days = weather.values[["ghi", "dhi", "dni"]].to_numpy(float).reshape(-1, 24, 3)
+def warn_of_repeated_hours(weather: Weather, path: str) -> None:
+    """Warn of days with the radiation of an earlier one, and of hours with that of the last."""
+    hours = weather.values[["ghi", "dhi", "dni"]].to_numpy(float)
+    days = hours.reshape(-1, 24, 3)
     _, first, kind = np.unique(
         days.reshape(len(days), -1), axis=0, return_index=True, return_inverse=True
     )
@@ -282,11 +289,6 @@ def warn_of_copied_days(weather: Weather, path: str) -> None:
             f"that of {source} on {copy}; check that days were not copied, and use another file if "
             "they were",
         )
-
-
-def warn_of_stuck_hours(weather: Weather, path: str) -> None:
-    """Warn of radiation that stays the same while the sun moves on."""
-    hours = weather.values[["ghi", "dhi", "dni"]].to_numpy(float)
     is_same = (hours[1:] == hours[:-1]).all(axis=1) & (hours[1:, 0] >= LEAST_STUCK_WM2)
     is_stuck = is_same[:-2] & is_same[1:-1] & is_same[2:]
     if is_stuck.any():
@@ -298,8 +300,22 @@ def warn_of_stuck_hours(weather: Weather, path: str) -> None:
         )
 
 
-def measure_rise(weather: Weather) -> np.ndarray:
-    """Return the sine (n,) of the sun's elevation, the mean around each time.
+def warn_of_moved_sun(weather: Weather, rises: np.ndarray, path: str) -> None:
+    """Warn of direct radiation that fits the sun of another time better (`rises` as measured)."""
+    ghi, dhi, dni = (weather.values[name].to_numpy(float) for name in ("ghi", "dhi", "dni"))
+    early, gap, late = np.abs(ghi - dhi - dni * rises).sum(axis=1)
+    if min(early, late) < MOVED * gap and gap > LEAST_MOVED * ghi.sum():
+        warn(
+            path,
+            "has diffuse and direct radiation that fit the sun about half an hour "
+            f"{'before' if early < late else 'after'} its times; check the longitude and time zone "
+            "of its station, and that its stamps end their hours",
+        )
+
+
+def measure_rises(weather: Weather) -> np.ndarray:
+    """Return the sine (3, n) of the sun's elevation, the mean around 20 minutes before each time,
+    around it, and around 20 minutes after it.
 
     It is 0 below the horizon.
     """
@@ -309,7 +325,8 @@ def measure_rise(weather: Weather) -> np.ndarray:
         place.get_solarposition(weather.times + minutes * minute)["zenith"].to_numpy()
         for minutes in SUN_MINUTES
     ]
-    return np.maximum(np.cos(np.radians(zeniths)), 0.0).mean(axis=0)
+    rises = np.maximum(np.cos(np.radians(zeniths)), 0.0)
+    return (rises[:-2] + rises[1:-1] + rises[2:]) / 3.0
 
 
 def shift_hours(times: Any, hours: float) -> Any:

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import shapely
 
 from ...errors import InputError, InputWarning
 from ...frames import Units
@@ -31,8 +30,6 @@ from ...read.points.pointcloud import PointFileHeader, common_crs, warn_coarse
 SAME_UNIT = 1e-5
 # of a length; national grids and UTM zones stay below 0.005, at 0.01 a house of 10 m is 10 cm off
 MOST_STRETCH = 0.01
-# of plan and of height, in the unit of the files: the ground goes on from one file to the next
-BESIDE, APART = 2.0, 10.0
 
 
 @dataclass(frozen=True)
@@ -74,7 +71,6 @@ def settle_frame(request: Any, headers: list[PointFileHeader]) -> AreaFrame:
     if cloud is None and (footprints is not None or read.unit == "auto"):
         log_assumed_crs(headers[0].path, frame)
     warn_coarse(headers, frame.units)
-    warn_of_heights_apart(headers)
     if frame.crs is not None:
         warn_outside_area_of_use(headers, frame)
     return frame
@@ -136,22 +132,6 @@ def warn_outside_area_of_use(headers: list[PointFileHeader], frame: AreaFrame) -
             "footprints to the UTM zone or the national grid",
             InputWarning,
         )
-
-
-def warn_of_heights_apart(headers: list[PointFileHeader]) -> None:
-    """Warn once where files side by side have no height in common."""
-    known = [header for header in headers if np.isfinite(header.bounds).all()]
-    boxes = shapely.box(*plan_bounds(known).T)
-    for pair in shapely.STRtree(boxes).query(boxes, predicate="dwithin", distance=BESIDE).T:
-        upper, lower = (known[k] for k in pair)
-        if upper.bounds[2] > lower.bounds[5] + APART:
-            warnings.warn(
-                f"{upper.path}: has heights from {upper.bounds[2]:.1f} on, and {lower.path} beside "
-                f"it up to {lower.bounds[5]:.1f}; one of them seems to be in another unit or "
-                "height system, which spoils houses on the border",
-                InputWarning,
-            )
-            return
 
 
 def plan_bounds(headers: list[PointFileHeader]) -> np.ndarray:

@@ -23,6 +23,7 @@ AROUND, AROUND_M = 8, 3.0  # points of one file that give the ground at a place 
 FEWEST_PLACES, ENOUGH_PLACES = 30, 1000  # that show a step, and after which no more are looked at
 STEP_M = 0.5  # between two files: that of strips, seasons and of most work on the ground is less
 SPREAD = 0.5  # of a step that is the same everywhere: the middle half of its heights, as a share
+APART_M = 10.0  # of that middle half: in feet, steps differ as much as the ground's heights
 
 
 def warn_of_steps(points: Path, clouds: Sequence[str]) -> None:
@@ -44,7 +45,7 @@ def warn_of_steps(points: Path, clouds: Sequence[str]) -> None:
             steps[first, second].extend(measure_steps(ground[first], ground[second]))
     for (first, second), heights in steps.items():
         low, step, high = np.quantile(heights or [0.0], (0.25, 0.5, 0.75))
-        is_alike = high - low < SPREAD * abs(step)
+        is_alike = high - low < SPREAD * abs(step) or low > APART_M or high < -APART_M
         if len(heights) >= FEWEST_PLACES and abs(step) > STEP_M and is_alike:
             warn(
                 mask(clouds[second]),
