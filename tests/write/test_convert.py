@@ -309,6 +309,26 @@ def test_global_ids_stay_when_another_building_leaves(gone, run, outputs, tmp_pa
     assert found == {id: ids[id] for id in ids if id != name}
 
 
+def read_mesh_ids(path):
+    """Return the identifiers of the meshes of a 3DM file by name."""
+    ids = {}
+    for item in reader("rhino3dm").File3dm.Read(str(path)).Objects:
+        ids.setdefault(item.Attributes.Name, set()).add(str(item.Attributes.Id))
+    return ids
+
+
+def test_meshes_keep_their_identifiers_when_another_building_leaves(run, outputs, tmp_path):
+    ids, lines = read_mesh_ids(outputs("3dm")), read_lines(run)
+    name = min(ids)
+    rest = write_town(tmp_path / "a", [line for line in lines if line.get("id") != name])
+    convert(rest, tmp_path / "a.3dm")
+    assert read_mesh_ids(tmp_path / "a.3dm") == {id: ids[id] for id in ids if id != name}
+    assert len(set().union(*ids.values())) == sum(map(len, ids.values()))
+    far = write_town(tmp_path / "b", lines, east=25_000.0)
+    convert(far, tmp_path / "b.3dm")
+    assert not set().union(*ids.values()) & set().union(*read_mesh_ids(tmp_path / "b.3dm").values())
+
+
 @pytest.mark.parametrize("number", range(3))
 def test_global_ids_stay_when_a_building_crosses_a_kilometre_line(number, run, outputs, tmp_path):
     first = [line for line in read_lines(run)[1:] if line.get("parts")][number]

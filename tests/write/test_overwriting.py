@@ -62,6 +62,8 @@ RUN_COMMANDS = {
     "reconstruct CLOUD --out IN --log-file RUN/parameters.jsonl": "a file of a run",
     "convert RUN FIFO --format glb": "a device or a pipe",
     "convert RUN FIFO --format 3dtiles": "choose another name",
+    "convert RUN FIFO --format obj": "a device or a pipe",
+    "convert RUN MINE --format 3dtiles": "a tileset alone",
     "report RUN CLOUD --out FIFO": "a device or a pipe",
 }
 
@@ -76,6 +78,9 @@ def test_outputs_never_stand_for_inputs_or_files_of_a_run(command, town):
     (town / "link.glb").symlink_to(town / "run" / "parameters.jsonl")
     os.link(town / "given" / "parameters.jsonl", town / "given.stl")
     os.mkfifo(town / "pipe")
+    (town / "mine").mkdir()
+    (town / "mine" / "tileset.json").write_text("{}")
+    (town / "mine" / "notes.txt").write_text("of years")
     (cloud,) = town.glob("*.la[sz]")
     places = {
         "RUN": town / "run",
@@ -86,6 +91,7 @@ def test_outputs_never_stand_for_inputs_or_files_of_a_run(command, town):
         "HARD": town / "given.stl",
         "TOML": town / "settings.toml",
         "FIFO": town / "pipe",
+        "MINE": town / "mine",
     }
     words = [
         str(places[first] / rest) if (first := word.partition("/")[0]) in places else word

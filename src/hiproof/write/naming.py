@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import re
+import uuid
 from dataclasses import dataclass
 from typing import Any
+
+import numpy as np
 
 from ..frames import METRES, Units
 from ..model.installation import CHIMNEY, ROOF_OBJECT
 
+NAMESPACE = uuid.uuid5(uuid.NAMESPACE_DNS, "hiproof")
+# Side (m) of the squares of the plan within which an id names one building, and a file one town: a
+# building that is remodelled may cross a line between them, which few stand near.
+TOWN_SQUARE_M = 10_000.0
 NOT_IN_NAME = re.compile(r"[^A-Za-z0-9_.-]")
 
 
@@ -41,6 +48,39 @@ class UniqueNames:
             unique = f"{name}..{count}"
         self.taken.add(unique)
         return unique
+
+
+class PlacedNames(UniqueNames):
+    """Names of buildings that hold in all files: of their ids and the places where they stand."""
+
+    def __init__(self, crs: str | None) -> None:
+        super().__init__()
+        self.crs_name = "" if crs is None else crs_name(crs)
+
+    def take_at(self, building_id: str, vertices: np.ndarray) -> str:
+        """Hand out the name of a building with vertices (n, 3)."""
+        middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
+        return self.take(f"{building_id} {self.name_square(middle)}")
+
+    def name_square(self, place: np.ndarray) -> str:
+        """Return the CRS and the square of the plan that a place (3,) lies in."""
+        x, y = np.floor(place[:2] / TOWN_SQUARE_M).astype(int).tolist()
+        return f"{self.crs_name} {x} {y}"
+
+
+def crs_name(crs: str) -> str:
+    """Return IFC's name of a CRS, "EPSG:28992" of the plan where it has a code."""
+    from pyproj import CRS
+
+    from ..read.crs import epsg_code, horizontal_crs
+
+    code = epsg_code(CRS(crs)) or epsg_code(horizontal_crs(CRS(crs)))
+    return CRS(crs).name if code is None else f"EPSG:{code}"
+
+
+def make_uuid(kind: str, key: str) -> uuid.UUID:
+    """Return the identifier of a thing, which programs keep: the same one in every file."""
+    return uuid.uuid5(NAMESPACE, f"{kind} {key}")
 
 
 def srs_name(crs: Any) -> str | None:

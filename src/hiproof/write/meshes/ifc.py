@@ -10,7 +10,6 @@ are those of all other formats.
 from __future__ import annotations
 
 import json
-import uuid
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -21,16 +20,11 @@ from ...extras import import_extra
 from ...frames import Units
 from ...model import CEILING, GROUND, ROOF, WALL, Face
 from ..colours import list_legend, srgb
-from ..naming import UniqueNames
+from ..naming import PlacedNames, crs_name, make_uuid
 from .viewed import Look, ViewedModel, choose_look, merge_values
 
 IFC_SCHEMA = "IFC4X3"
 PROPERTY_SET = "hiproof"
-# of GlobalIds, which follow from ids and places: the same building has the same one in every file
-NAMESPACE = uuid.uuid5(uuid.NAMESPACE_DNS, "hiproof")
-# Side (m) of the squares of the plan within which an id names one building, and a file one town: a
-# building that is remodelled may cross a line between them, which few stand near.
-TOWN_SQUARE_M = 10_000.0
 FIXED_TIME = "2000-01-01T00:00:00"  # in place of the clock's, for files that do not depend on it
 PRECISION_M = 1e-4  # of coordinates, as all formats have them
 
@@ -77,8 +71,7 @@ class IfcModel:
 
     def __init__(self, ifcopenshell: Any, crs: str | None) -> None:
         self.guid, self.crs = ifcopenshell.guid, crs
-        self.crs_name = "" if crs is None else crs_name(crs)
-        self.keys = UniqueNames()
+        self.keys = PlacedNames(crs)
         self.file = ifcopenshell.file(schema=IFC_SCHEMA)
         self.file.header.file_name.time_stamp = FIXED_TIME
         self.file.header.file_name.originating_system = "hiproof"
@@ -107,8 +100,8 @@ class IfcModel:
 
     def make_rooted(self, kind: str, key: str, **values: Any) -> Any:
         """Make an entity whose GlobalId follows from its kind and `key`."""
-        name = uuid.uuid5(NAMESPACE, f"{kind} {key}")
-        return self.make(kind, GlobalId=self.guid.compress(name.hex), **values)
+        name = self.guid.compress(make_uuid(kind, key).hex)
+        return self.make(kind, GlobalId=name, **values)
 
     def point(self, place: np.ndarray) -> Any:
         return self.make("IfcCartesianPoint", Coordinates=np.round(place, 4).tolist())
@@ -117,8 +110,7 @@ class IfcModel:
         """Add a building with its body and its properties."""
         if self.origin is None:
             self.origin = model.corner
-        middle = (model.solid.vertices.min(axis=0) + model.solid.vertices.max(axis=0)) / 2
-        key = self.keys.take(f"{model.id} {self.name_square(middle)}")
+        key = self.keys.take_at(model.id, model.solid.vertices)
         building = self.make_rooted(
             "IfcBuilding",
             key,
@@ -226,11 +218,6 @@ class IfcModel:
         kind = IFC_VALUES.get(type(value), "IfcText")
         return self.make(kind, value if type(value) in IFC_VALUES else json.dumps(value))
 
-    def name_square(self, place: np.ndarray) -> str:
-        """Return the CRS and the square of the plan that a place (3,) lies in."""
-        x, y = np.floor(place[:2] / TOWN_SQUARE_M).astype(int).tolist()
-        return f"{self.crs_name} {x} {y}"
-
     def finish(self) -> None:
         """Add what holds the buildings: project, site, units and the place of the origin."""
         metre, square, cube, radian = (
@@ -243,7 +230,7 @@ class IfcModel:
             )
         )
         units = self.make("IfcUnitAssignment", Units=[metre, square, cube, radian])
-        town = self.name_square(np.zeros(3) if self.origin is None else self.origin)
+        town = self.keys.name_square(np.zeros(3) if self.origin is None else self.origin)
         project = self.make_rooted(
             "IfcProject",
             town,
@@ -310,13 +297,3 @@ def scale_axes(units: Units) -> tuple[str, dict[str, float]]:
     if plan == height:
         return "IfcMapConversion", {"Scale": plan}
     return "IfcMapConversionScaled", {"FactorX": plan, "FactorY": plan, "FactorZ": height}
-
-
-def crs_name(crs: str) -> str:
-    """Return IFC's name of a CRS, "EPSG:28992" of the plan where it has a code."""
-    from pyproj import CRS
-
-    from ...read.crs import epsg_code, horizontal_crs
-
-    code = epsg_code(CRS(crs)) or epsg_code(horizontal_crs(CRS(crs)))
-    return CRS(crs).name if code is None else f"EPSG:{code}"

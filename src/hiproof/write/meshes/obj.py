@@ -30,8 +30,6 @@ def write_models(path: Path, buildings: Iterable[ViewedModel], crs: str | None =
 
     path = Path(path)
     library = path.with_suffix(".mtl")
-    with atomic_file(library) as file:
-        file.write(material_library().encode())
     count, first, origin = 0, 1, None
     with atomic_file(path) as file:
         for model in buildings:
@@ -41,6 +39,8 @@ def write_models(path: Path, buildings: Iterable[ViewedModel], crs: str | None =
             file.write(building_text(model, origin, first).encode())
             first += len(model.solid.vertices)
             count += 1
+    with atomic_file(library) as file:
+        file.write(material_library().encode())
     return count
 
 

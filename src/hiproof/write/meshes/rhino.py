@@ -1,7 +1,8 @@
 """3DM for Rhino and Grasshopper: meshes on layers by surface (needs rhino3dm).
 
 Each building has a mesh of its walls, of its ground and of the roof of each part, named by its id
-and in one group. Roofs have the colours of their types. Attributes are user texts of the meshes.
+and in one group. A mesh keeps its identifier in all files. Roofs have the colours of their types.
+Attributes are user texts of the meshes.
 
 Coordinates are metres about an origin, because meshes are float32. The texts `origin` and `crs` of
 the document place them.
@@ -19,6 +20,7 @@ import numpy as np
 from ...errors import OutputError
 from ...extras import import_extra
 from ...model import CEILING, GROUND, ROOF, WALL, Face
+from ..naming import PlacedNames, make_uuid
 from .triangles import faces_triangles
 from .viewed import ViewedModel, choose_look, merge_values
 
@@ -37,10 +39,11 @@ def write_models(path: Path, buildings: Iterable[ViewedModel], crs: str | None =
     document, count, origin = rhino.File3dm(), 0, np.zeros(3)
     document.Settings.ModelUnitSystem = rhino.UnitSystem.Meters
     layers = {kind: add_layer(rhino, document, kind) for kind in (ROOF, WALL, GROUND, CEILING)}
+    keys = PlacedNames(crs)
     for model in buildings:
         if not count:
             origin = model.corner
-        add_building(rhino, document, layers, model, origin)
+        add_building(rhino, document, layers, model, origin, keys)
         count += 1
     document.Strings["origin"] = " ".join(f"{value:.0f}" for value in origin)
     document.Strings["crs"] = crs or ""
@@ -61,15 +64,22 @@ def add_layer(rhino: Any, document: Any, kind: str) -> int:
 
 
 def add_building(
-    rhino: Any, document: Any, layers: dict[str, int], model: ViewedModel, origin: np.ndarray
+    rhino: Any,
+    document: Any,
+    layers: dict[str, int],
+    model: ViewedModel,
+    origin: np.ndarray,
+    keys: PlacedNames,
 ) -> None:
     """Add the meshes of a building."""
     group = rhino.Group()
     group.Name = model.id
     document.Groups.Add(group)
     values = merge_values({"id": model.id, "roof_type": model.roof_type}, model.attributes)
-    for (kind, _), faces in model.faces_by_element().items():
+    key = keys.take_at(model.id, model.solid.vertices)
+    for (kind, part), faces in model.faces_by_element().items():
         attributes = rhino.ObjectAttributes()
+        attributes.Id = make_uuid(kind, f"{key} {part}")
         attributes.Name, attributes.LayerIndex = model.id, layers[kind]
         attributes.AddToGroup(len(document.Groups) - 1)
         colour = choose_look(faces[0], model.part_types).colour

@@ -189,18 +189,19 @@ def bound_boxes(boxes: np.ndarray) -> dict[str, list[float]]:
 
 
 def make_room(folder: Path) -> None:
-    """Make the parent of `folder`; OutputError where `folder` is there and no tileset."""
+    """Make the parent of `folder`; OutputError where it holds more than a tileset of ours."""
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
+        files = (file.relative_to(folder) for file in folder.rglob("*") if not file.is_dir())
         is_ours = not folder.exists() or (
-            folder.is_dir() and ((folder / TILESET).is_file() or not any(folder.iterdir()))
+            folder.is_dir() and all(f == Path(TILESET) or f.match("tiles/*.glb") for f in files)
         )
     except OSError as error:
         raise output_error(folder, error) from error
     if not is_ours:
         raise OutputError(
-            f"expected a new folder or one with a tileset for the tiles, got {folder}; choose "
-            "another name"
+            "expected a new folder or one with a tileset alone for the tiles, got "
+            f"{folder}; choose another name"
         )
 
 
