@@ -9,8 +9,8 @@ import numpy as np
 import shapely
 
 from ..errors import CompositionError
-from ..model import Part, Roof, Solid
-from ..primitives.catalogue import CATALOGUE
+from ..model import Roof, Solid
+from ..primitives.ribs import draw_facets
 from ..settings import ComposeSettings, Settings
 from .arrangement import GRID_M
 from .cells import PlanProblem, arrange, plan_problem
@@ -18,20 +18,10 @@ from .check import Finding, check_solid
 from .shell import Saddles, raise_shell
 
 
-def draw_facets(roof: Roof, chord_m: float) -> Roof:
+def draw_all_facets(roof: Roof, chord_m: float) -> Roof:
     """Return the roof with facets of its curved parts within a tolerance (m)."""
-    parts = tuple(draw_part_facets(part, chord_m) for part in roof.parts)
+    parts = tuple(draw_facets(part, roof.outline, chord_m) for part in roof.parts)
     return replace(roof, parts=parts)
-
-
-def draw_part_facets(part: Part, chord_m: float) -> Part:
-    """Return a part with other facets, or as it is where it is not curved."""
-    refine = CATALOGUE[part.type].refine if part.type in CATALOGUE else None
-    if refine is None or not part.parameters:
-        return part
-    shape = refine(part.parameters, chord_m)
-    planes = shape.planes_at(shape.to_theta(part.parameters, part.kappa, part.translation))
-    return replace(part, pieces=shape.make_pieces(part.outlines, planes))
 
 
 CROSSING_MOVE_M = 2e-4  # rounding to the grid moves a crossing by less
@@ -70,7 +60,7 @@ def compose(roof: Roof, z_ground_local: float, settings: Settings | None = None)
             f"expected a finite ground height, got {z_ground_local}; take the lowest terrain under "
             "the outline"
         )
-    problem = plan_problem(draw_facets(roof, options.chord_tolerance_m))
+    problem = plan_problem(draw_all_facets(roof, options.chord_tolerance_m))
     failure = ""
     parts: tuple[int, ...] = ()
     for coarseness, merges_walls in ATTEMPTS:

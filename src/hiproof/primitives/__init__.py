@@ -8,6 +8,7 @@ revolved    profiles turned around an axis: domes, barrel vaults, onions
 shed        saw-teeth
 cone        cones, spires and half cones
 catalogue   all shapes by name
+ribs        facets along the sides of an outline
 cants       further planes over walls that cut corners off
 family      shapes of at most one plane a side and a level top
 parameters  whether given parameters make a shape

@@ -16,6 +16,8 @@ from shapely import affinity
 
 from ...geometry.rings import counterclockwise, intersect, join, subtract
 from ...model import Part
+from ...primitives.facets import CHORD_M
+from ...primitives.ribs import draw_facets
 from .regions import cut_part, list_polygons
 
 # Turns (degrees) between sides that follow a circle, or a polygon of six sides or more.
@@ -122,7 +124,8 @@ def cut_to_outline(shape: Part, arc: Arc, outline: shapely.Polygon) -> Iterator[
     plan = follow_arc(shape.pieces[0].outline, arc)
     polygons = list_polygons(intersect(plan, outline))
     if polygons:
-        yield cut_part(shape, max(polygons, key=lambda polygon: polygon.area))
+        part = cut_part(shape, max(polygons, key=lambda polygon: polygon.area))
+        yield draw_facets(part, outline, CHORD_M)
 
 
 def follow_arc(plan: shapely.Polygon, arc: Arc) -> shapely.Geometry:

@@ -71,7 +71,7 @@ def list_arc_shapes(roof: PartsRoof, arc: Arc, names: list[str]) -> Iterator[tup
         row = ROUND_SHAPES.get(name)
         if row is None or not row.span_deg[0] <= arc.span_deg <= row.span_deg[1]:
             continue
-        if not (arc.is_round if row.sides is None else arc.sides == row.sides):
+        if row.sides is not None and arc.sides != row.sides:
             continue
         radius = arc.radius * (find_apothem(arc.sides) if row.sides else 1.0)
         theta = np.array([*arc.centre, arc.facing, radius, radius, 0.0, 0.0, 0.0, 0.0])
@@ -79,6 +79,7 @@ def list_arc_shapes(roof: PartsRoof, arc: Arc, names: list[str]) -> Iterator[tup
             theta[KAPPA], theta[HALF_LENGTH] = arc.kappa, 0.5 * radius
             theta[:KAPPA] += 0.5 * radius * arc.way
         hidden = 2 if arc.span_deg <= APSE_DEG[1] and name != "half_cone" else 0
+        hidden += name == "cone" and arc.sides in SPIRE_SIDES  # a spire says as much
         for free in ((), (CX, CY)) if name in ("cone", "dome") else ((),):
             fitted = fit_followers(roof.points, CATALOGUE[name], theta, free)
             if fitted is not None:
