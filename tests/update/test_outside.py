@@ -80,6 +80,23 @@ def test_roofs_outside_all_outlines_are_told_apart(update):
     assert places["extended"].intersection(box).area > 0.75 * box.area
 
 
+@pytest.mark.parametrize("aside", [0.3, 0.5, 0.8])
+def test_an_extension_of_three_metres_is_found_wherever_it_lies(aside, tmp_path):
+    """Its cells beside the outline count where those beyond them are few."""
+    before, after = make_town(houses=1), make_town(houses=1, seed=7)
+    put_block(after, (20, 12, 22.8, 20))
+    for name, town in (("first", before), ("second", after)):
+        write_cloud(tmp_path / f"{name}.laz", town.xyz + [aside, aside, 0], town.classification)
+    outlines = {
+        id: shapely.transform(f, lambda xy: xy + aside) for id, f in before.footprints.items()
+    }
+    footprints = str(write_footprints(tmp_path / "footprints.geojson", outlines))
+    reconstruct_area(Request((str(tmp_path / "first.laz"),), tmp_path / "run", footprints))
+    second = (str(tmp_path / "second.laz"),)
+    summary = update_area(UpdateRequest(second, tmp_path / "out", run=tmp_path / "run", date=DATE))
+    assert summary.outside == {"extended": 1}
+
+
 def test_build_makes_the_same_tables_of_the_parameters(update, tmp_path):
     _, out = update
     build_file(out / "parameters.jsonl", tmp_path)

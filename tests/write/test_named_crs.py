@@ -11,9 +11,11 @@ import hiproof
 from hiproof.cli.convert import convert
 from hiproof.errors import InputError, InputWarning
 from hiproof.evaluate.models import read_models
+from hiproof.parametric.run import build_file
 from hiproof.read.models.solids import read_solids
 from hiproof.read.outlines.footprints import read_footprints
 from layers import write_layer
+from streets import place_house
 
 CORNERS = np.array([[i, j, k] for k in (0, 6) for i, j in ((0, 0), (10, 0), (10, 10), (0, 10))])
 SHELL = [(0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)]
@@ -138,6 +140,17 @@ def test_files_put_one_behind_the_other_have_one_crs(codes, reader, tmp_path):
     path = write_seq(tmp_path / "a.city.jsonl", *((code, PLACE[0]) for code in codes))
     with pytest.raises(InputError, match=r"expected one CRS in a file, got .* in line 3 of"):
         list(READERS[reader](path))
+
+
+def test_parameters_put_one_behind_the_other_are_refused(tmp_path):
+    """What follows a second head would stand in the first one's CRS."""
+    lines = [{"hiproof_parameters": 1, "crs": f"EPSG:{code}"} for code in (25832, 7415)]
+    text = "".join(json.dumps(line) + "\n" for line in (lines[0], place_house("a", 0, 0), lines[1]))
+    (tmp_path / "parameters.jsonl").write_text(text)
+    with pytest.raises(InputError, match=r"expected one head in .*, got another in line 3"):
+        convert(tmp_path / "parameters.jsonl", tmp_path / "a.gpkg")
+    with pytest.raises(InputError, match=r"expected one head in .*, got another in line 3"):
+        build_file(tmp_path / "parameters.jsonl", tmp_path / "built")
 
 
 @pytest.mark.parametrize("codes", [(25832, 25832), (25832, None), (None, None)])

@@ -135,8 +135,13 @@ def read_head(record: Any, path: str | os.PathLike[str]) -> FileHead:
 def records(
     lines: Iterator[tuple[int, Any]], path: str | os.PathLike[str], damaged: Damaged = refuse
 ) -> Iterator[dict[str, Any]]:
-    """Yield the buildings after the head."""
+    """Yield the buildings after the head. Raises InputError for a second head."""
     for number, record in lines:
+        if isinstance(record, dict) and HEAD_KEY in record:
+            raise InputError(
+                f"expected one head in {os.fspath(path)}, got another in line {number}, so files "
+                "were joined; leave each a file of its own"
+            )
         if record is not DAMAGED and not (
             isinstance(record, dict) and isinstance(record.get("id"), str)
         ):

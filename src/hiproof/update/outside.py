@@ -309,10 +309,10 @@ def group_cells(points: np.ndarray, is_core: np.ndarray) -> Iterator[np.ndarray]
     labels = label_components(len(core), link_neighbours(keys[core]))
     for label in np.flatnonzero(np.bincount(labels) >= FEWEST_OUTSIDE):
         members = core[labels == label]
-        cells = points[members, :3]
-        if not is_strip(cells) and measure_roughness(cells) <= ROUGH_M:
-            grown = np.isin(keys, keys[members, None] + AROUND_KEYS) & ~is_core
-            yield np.union1d(members, np.flatnonzero(grown))
+        grown = np.isin(keys, keys[members, None] + AROUND_KEYS) & ~is_core
+        place = np.union1d(members, np.flatnonzero(grown))
+        if not is_strip(points[place]) and measure_roughness(points[members, :3]) <= ROUGH_M:
+            yield place
 
 
 def touches(points: np.ndarray, outlines: shapely.STRtree, distance_m: float) -> np.ndarray:
