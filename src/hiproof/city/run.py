@@ -142,10 +142,14 @@ def reconstruct_in_folder(
     try:
         plan = resume_or_plan(request, state, ledger, progress, steps.make_plan)
         if request.processes is None and not request.scheduler:
-            executor = make_executor(count_processes(request, ledger))
+            remainder = ledger.open_buildings()
+            buildings = sum(map(len, remainder.values()))
+            executor = make_executor(
+                as_many_as_pay(buildings, len(remainder), request.footprints is not None)
+            )
         clock.lap("plan")
         if ledger.open_tasks("sort") or ledger.open_tasks("solve"):
-            executor.prepare(list_compiled_pieces(request))
+            executor.prepare(WITHOUT_FOOTPRINTS if request.footprints is None else MAIN_JOB)
         clock.lap("prepare")
         queue = Queue(plan, state, ledger, executor, request.clouds, request.terrain, progress)
         queue.work_off("sort", steps.sort_cloud)
@@ -178,18 +182,6 @@ def reconstruct_in_folder(
         with suppress(sqlite3.Error):
             ledger.interrupt()
         ledger.close()
-
-
-def count_processes(request: Request, ledger: Ledger) -> int:
-    """Return as many processes as pay for the buildings left to do."""
-    remainder = ledger.open_buildings()
-    buildings = sum(map(len, remainder.values()))
-    return as_many_as_pay(buildings, len(remainder), request.footprints is not None)
-
-
-def list_compiled_pieces(request: Request) -> tuple[str, ...]:
-    """Return the pieces of compiled code that the run needs."""
-    return WITHOUT_FOOTPRINTS if request.footprints is None else MAIN_JOB
 
 
 class Clock:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -85,16 +84,11 @@ def evaluate(
             f"{files[0]}, {files[1]}: "
             f"{count_things(len(run.figures), 'building')}{left_out.describe()}"
         )
-        describe_gaps(run.figures)
+        unmeasured = sum(math.isnan(item.quality.psd_mean) for item in run.figures)
+        if unmeasured:
+            entries = count_things(unmeasured, "building")
+            click.echo(f"{entries} without distances (no model, or no points) are not in the means")
     return left_out.exit_code
-
-
-def describe_gaps(figures: Sequence[Any]) -> None:
-    """Say how many buildings have no distances, where any has none."""
-    unmeasured = sum(math.isnan(item.quality.psd_mean) for item in figures)
-    if unmeasured:
-        entries = count_things(unmeasured, "building")
-        click.echo(f"{entries} without distances (no model, or no points) are not in the means")
 
 
 def print_summary(summary: dict, has_reference: bool) -> None:

@@ -10,15 +10,15 @@ from __future__ import annotations
 import datetime
 import itertools
 import re
-import struct
 import warnings
 from collections.abc import Iterable, Sequence
-from pathlib import Path
 
 import numpy as np
 
 from ..errors import InputError, InputWarning
 from ..masking import mask
+from ..read.points.las import read_checked_facts
+from ..read.points.las_header import LasFacts
 from ..read.points.pointcloud import expand_paths
 from ..read.remote import is_url
 
@@ -28,7 +28,6 @@ WEEK_S = 7 * 86400.0
 """Times (s) up to this are seconds of a GPS week, whatever the header says: nothing tells which."""
 
 FIRST_DAY = datetime.date(1990, 1, 1)  # before airborne laser scanning; clocks not set say 1980
-LAS_HEAD_BYTES = 94  # of a LAS file, up to the date
 FIRST_POINTS = 1000  # whose time tells the day of a file
 
 
@@ -105,10 +104,10 @@ def find_latest(days: Iterable[datetime.date | None]) -> str:
 
 def date_by_header(path: str) -> datetime.date | None:
     """Return the day on which a LAS file was written, None where it names none."""
-    head = read_head(path)
-    if head is None:
+    facts = read_facts(path)
+    if facts is None:
         return None
-    day, year = struct.unpack_from("<HH", head, 90)
+    day, year = facts.created
     if not (1 <= day <= 366 and FIRST_DAY.year <= year <= datetime.date.today().year):
         return None
     date = datetime.date(year, 1, 1) + datetime.timedelta(days=day - 1)
@@ -125,8 +124,8 @@ def date_by_first_points(path: str) -> datetime.date | None:
 
     None where their times are no adjusted standard GPS time, or later than their file.
     """
-    head = read_head(path)
-    if head is None or not struct.unpack_from("<H", head, 6)[0] & 1:
+    facts = read_facts(path)
+    if facts is None or not facts.has_gps_time:
         return None
     import laspy
 
@@ -148,13 +147,12 @@ def last_second(date: datetime.date) -> float:
     return float((date - GPS_EPOCH.date()).days + 2) * 86400.0 - ADJUSTED_S
 
 
-def read_head(path: str) -> bytes | None:
-    """Return the first bytes of a LAS file of this machine, None for another."""
-    if is_url(path) or not Path(path).is_file():
-        return None
-    with open(path, "rb") as file:
-        head = file.read(LAS_HEAD_BYTES)
-    return head if len(head) == LAS_HEAD_BYTES and head.startswith(b"LASF") else None
+def read_facts(path: str) -> LasFacts | None:
+    """Return the header of a LAS file of this machine, None for another or a damaged one."""
+    try:
+        return None if is_url(path) else read_checked_facts(path)
+    except InputError:
+        return None  # the step that sorts points says what is wrong
 
 
 FORM = "--epoch 2014=FOLDER, or --epoch 2014-05-01=FOLDER"

@@ -88,14 +88,12 @@ def read_earlier(folder: Path) -> EarlierRun:
             "its models alone; changes that the models leave out are not told from their errors",
             InputWarning,
         )
-    overrides, date = find_overrides(folder, record), find_run_date(record, inputs.clouds)
-    return EarlierRun(head, records, settings, surveys, overrides, date)
-
-
-def find_run_date(record: dict[str, Any], clouds: tuple[str, ...]) -> str:
-    """Return the day or year of the newest survey of a run, "" where nothing tells."""
     named = str((record.get("update") or {}).get("survey_date") or "")
-    return named or max(record.get("epochs") or [""]) or date_by_points(clouds)
+    overrides, date = (
+        find_overrides(folder, record),
+        (named or max(record.get("epochs") or [""]) or date_by_points(inputs.clouds)),
+    )
+    return EarlierRun(head, records, settings, surveys, overrides, date)
 
 
 def find_overrides(folder: Path, record: dict[str, Any]) -> str | None:

@@ -499,7 +499,8 @@ def solve_by_points(
         and override is None
         and not (roof_points.is_ground and plan.settings.reconstruct.empty_footprints == "model")
     ):
-        return make_unseen_building(job, roof_points)
+        status = Status.NO_BUILDING if roof_points.is_ground and job.footprint else Status.NO_ROOF
+        return add_input(Building(job.id, status, roof_points.remark), job)
     points = without_repeats(roof_points.points)
     in_use = thin_to_count(points, plan.settings.city.max_points_a_building)
     other_points = surroundings.select_other_points(job)
@@ -554,12 +555,6 @@ def remark_missing_ground(building: Building) -> str:
         f"{Doubt.ASSUMED_GROUND.value}, for none is seen near it: its volume and height over "
         "ground are guesses"
     )
-
-
-def make_unseen_building(job: Job, result: FoundRoof) -> Building:
-    """Make a building whose outline holds no roof, as far as points show."""
-    status = Status.NO_BUILDING if result.is_ground and job.footprint else Status.NO_ROOF
-    return add_input(Building(job.id, status, result.remark), job)
 
 
 def add_input(building: Building, job: Job) -> Building:

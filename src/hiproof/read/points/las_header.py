@@ -21,6 +21,8 @@ import numpy as np
 from ..plausible import MOST_HEIGHT, MOST_PLAN, Implausible, compute_bounds
 
 HEADER_BYTES = {0: 227, 1: 227, 2: 227, 3: 235, 4: 375, 5: 393}  # by minor version
+# encoding, version, day and year of the file, sizes, points, their bounds, what lies behind them
+HEADER = struct.Struct("<6xH82xHHHIIBHI5I12dQQIQ")
 RECORD_BYTES = (20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67)  # by point format, without extra bytes
 # LAZ's bit in the point format, its size of chunks that vary, its compressor of layered chunks
 COMPRESSED, VARIABLE_CHUNKS, LAYERED = 0x80, 2**32 - 1, 3
@@ -42,13 +44,16 @@ class Octree(NamedTuple):
 class LasFacts:
     """The fields of the public header block, and the file's `size` in bytes.
 
-    Arrays are (3,): x, y, z. `points_end` is the first byte that no point may take: of waveforms,
+    Arrays are (3,): x, y, z. `created` are the day of a year and that year. `points_end` is the first
+    byte that no point may take: of waveforms,
     of extended records, or the end. `laszip` is the record that tells how points are compressed;
     only COPC has an `octree`; `projection` are the records of the CRS.
     """
 
     size: int
     minor: int
+    created: tuple[int, int]
+    has_gps_time: bool
     header_bytes: int
     data_start: int
     records: int
@@ -123,15 +128,13 @@ def parse_header(head: bytes, size: int) -> LasFacts:
             f"its header is that of LAS {major}.{minor} in a file of {size} bytes; 1.0 to 1.5 are "
             "known"
         )
-    header_bytes, data_start, records, point_format, point_bytes, count = struct.unpack_from(
-        "<HIIBHI", head, 94
-    )
-    far_start, far_count, wave_start = 0, 0, 0
-    if minor >= 3 and struct.unpack_from("<H", head, 6)[0] & 2:
-        wave_start = struct.unpack_from("<Q", head, 227)[0]
+    # what an older version does not have is 0
+    values = HEADER.unpack(head[: HEADER_BYTES[minor]].ljust(HEADER.size, b"\0")[: HEADER.size])
+    encoding, day, year, header_bytes, data_start, records, *points = values[:9]
+    point_format, point_bytes, count = points
+    wave_start, far_start, far_count, long_count = values[26:]
     if minor >= 4:
-        legacy = count
-        far_start, far_count, count = struct.unpack_from("<QIQ", head, 235)
+        legacy, count = count, long_count
         # a writer may leave the old field at 0 although older readers know the points' format: LAS
         # 1.4 allows it
         if point_format & ~COMPRESSED < 6 and legacy not in (0, count) and count <= 2**32 - 1:
@@ -139,20 +142,22 @@ def parse_header(head: bytes, size: int) -> LasFacts:
                 f"its header tells of {count} points and, in the field for older readers, of "
                 f"{legacy}"
             )
-    numbers = np.array(struct.unpack_from("<12d", head, 131))
-    ends = [start for start in (wave_start, far_start if far_count else 0) if start]
+    numbers = np.array(values[14:26])
+    ends = [wave_start if encoding & 2 else 0, far_start if far_count else 0]
     return LasFacts(
-        size=size,
-        minor=minor,
-        header_bytes=header_bytes,
-        data_start=data_start,
-        records=records,
-        point_format=point_format & ~COMPRESSED,
-        compressed=bool(point_format & COMPRESSED),
-        point_bytes=point_bytes,
-        count=count,
-        count_by_return=sum(struct.unpack_from("<5I", head, 111)),
-        points_end=min([size, *ends]),
+        size,
+        minor,
+        (day, year),
+        bool(encoding & 1),
+        header_bytes,
+        data_start,
+        records,
+        point_format & ~COMPRESSED,
+        bool(point_format & COMPRESSED),
+        point_bytes,
+        count,
+        sum(values[9:14]),
+        min([size, *filter(None, ends)]),
         scales=numbers[:3],
         offsets=numbers[3:6],
         maxs=numbers[6::2],
