@@ -25,7 +25,7 @@ from ...compiled import news
 from ...compiled.stamp import count_compiled
 from ...errors import InputError, OutputError, raise_interrupt
 from ...extras import import_extra
-from .processes import Processes
+from .processes import Processes, hand_out
 from .tasks import TaskOutcome, WorkerLost
 from .warm import make_ready
 
@@ -93,17 +93,10 @@ class Dask:
             patience.cancel()
 
     def run(self, function: Callable, tasks: Iterable[tuple]) -> Iterator[TaskOutcome]:
-        waiting = iter(tasks)
-        running: dict[Any, tuple] = {}
-        ends: SimpleQueue = SimpleQueue()
-        while True:
-            threads = sum(self.client.nthreads().values())
-            while len(running) < max(2 * threads, 2) and (task := next(waiting, None)) is not None:
-                running[self.submit(ends, function, task)] = task
-            if not running:
-                return
-            future = self.next_end(ends)
-            yield running.pop(future), *self.outcome(future)
+        return hand_out(self, function, tasks)
+
+    def count_workers(self) -> int:
+        return sum(self.client.nthreads().values())
 
     def submit(self, ends: SimpleQueue, function: Callable, task: tuple, **where: Any) -> Any:
         """Submit a task, and return a future that goes into `ends` when it ends."""

@@ -9,12 +9,13 @@ import sys
 import threading
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from multiprocessing.sharedctypes import RawValue
+from queue import Empty, SimpleQueue
 from typing import Any
 
 from ... import log
@@ -32,7 +33,7 @@ COUNT_S = 0.5  # seconds between looks at how many buildings the workers of this
 class Processes:
     """`count` worker processes.
 
-    See workers.py for how they begin.
+    See `begin_worker` for how they begin.
     """
 
     def __init__(self, count: int):
@@ -47,43 +48,19 @@ class Processes:
         make_ready(pieces)
 
     def run(self, function: Callable, tasks: Iterable[tuple]) -> Iterator[TaskOutcome]:
-        waiting = iter(tasks)
-        running: dict[Future, tuple] = {}
         try:
-            while True:
-                # two tasks a worker in the queue: enough to keep it busy, few enough to lose little
-                # when one dies
-                while len(running) < 2 * self.count and (task := next(waiting, None)) is not None:
-                    running[self.submit(function, task)] = task
-                if not running:
-                    return
-                finished, _ = wait(running, timeout=COUNT_S, return_when=FIRST_COMPLETED)
-                self.tell_count()
-                if any(isinstance(future.exception(), BrokenProcessPool) for future in finished):
-                    # a worker died and the pool with it: what finished is handed back, the rest is
-                    # lost, and a new pool is started
-                    finished, _ = wait(running)
-                    self.close()
-                for future in finished:
-                    error: Any = future.exception()
-                    result = None if error else future.result()
-                    if isinstance(error, BrokenProcessPool):
-                        error = WorkerLost("a worker process died")
-                    yield running.pop(future), result, error
+            yield from hand_out(self, function, tasks)
         # Ctrl-C, most of all: nobody waits any more for what the workers are at
         except BaseException:
             if self.word is not None:
                 self.word.close()
             raise
 
-    def tell_count(self) -> None:
-        """Tell the listener how many more buildings the workers have solved."""
-        number = self.count_solved.value - self.told
-        if number > 0:
-            self.told += number
-            solved.listener(number)
+    def count_workers(self) -> int:
+        return self.count
 
-    def submit(self, function: Callable, task: tuple) -> Future:
+    def submit(self, ends: SimpleQueue, function: Callable, task: tuple) -> Future:
+        """Submit a task, and return a future that goes into `ends` when it ends."""
         if self.pool is None:
             context = get_context("spawn")
             heard, self.word = context.Pipe(duplex=False)
@@ -93,11 +70,31 @@ class Processes:
             )
         try:
             with limit_threads(), start_deaf():
-                return self.pool.submit(function, *task)
-        except BrokenProcessPool as error:
-            lost: Future = Future()
-            lost.set_exception(error)
-            return lost
+                future = self.pool.submit(function, *task)
+        except BrokenProcessPool:  # a worker died, and the pool with it
+            self.close()
+            return self.submit(ends, function, task)
+        future.add_done_callback(ends.put)
+        return future
+
+    def next_end(self, ends: SimpleQueue) -> Future:
+        """Return the next future that ends, and tell how many more buildings are solved."""
+        future = None
+        while future is None:
+            with suppress(Empty):
+                future = ends.get(timeout=COUNT_S)
+            number = self.count_solved.value - self.told
+            if number > 0:
+                self.told += number
+                solved.listener(number)
+        return future
+
+    def outcome(self, future: Future) -> tuple[Any, Exception | None]:
+        """Return (result, error)."""
+        error: Any = future.exception()
+        if isinstance(error, BrokenProcessPool):
+            error = WorkerLost("a worker process died")
+        return None if error else future.result(), error
 
     def isolate(self) -> Processes:
         return Processes(1)
@@ -106,6 +103,23 @@ class Processes:
         if self.pool is not None:
             self.pool.shutdown(wait=True, cancel_futures=True)
             self.pool = None
+
+
+def hand_out(workers: Any, function: Callable, tasks: Iterable[tuple]) -> Iterator[TaskOutcome]:
+    """Run tasks on `workers`, Processes or Dask, and yield their outcomes as they end."""
+    waiting = iter(tasks)
+    running: dict[Any, tuple] = {}
+    ends: SimpleQueue = SimpleQueue()
+    while True:
+        # two tasks a worker in the queue: enough to keep it busy, few enough to lose little when
+        # one dies
+        most = max(2 * workers.count_workers(), 2)
+        while len(running) < most and (task := next(waiting, None)) is not None:
+            running[workers.submit(ends, function, task)] = task
+        if not running:
+            return
+        future = workers.next_end(ends)
+        yield running.pop(future), *workers.outcome(future)
 
 
 @contextmanager
