@@ -19,7 +19,8 @@ from hiproof.fit import fit_roof
 from hiproof.segment import combine, segment
 from hiproof.segment.scores import Scores
 from hiproof.settings import Settings
-from hiproof.simulate import ROOF_TYPES, training_sample
+from hiproof.simulate import ROOF_TYPES
+from .samples import training_sample
 
 from .tables import FigureTable, make_parser
 

@@ -34,7 +34,9 @@ from hiproof.model import GROUND, Building, Solid
 from hiproof.read.models.solids import read_solids
 from hiproof.simulate import SOURCES, Defects, ScanSettings, scan_solids
 from hiproof.status import Status
-from hiproof.write import write_all
+from hiproof.formats import list_requested_files
+from hiproof.settings import Settings
+from hiproof.write import FileHead, fragments, join_fragments
 
 from .judging import SHARED, describe_parts
 from .tables import FigureTable, make_parser
@@ -152,7 +154,9 @@ def write_truth(path: Path, source: Path, buildings: list[TrueBuilding]) -> None
 def write_run(folder: Path, models: list[Building], points: list[np.ndarray]) -> None:
     """Write models and points of a town as `hiproof reconstruct` does."""
     folder.mkdir(parents=True, exist_ok=True)
-    write_all(folder, models)
+    head = FileHead()
+    texts = (fragments(model, (model.id, model.id), head)[1] for model in models)
+    join_fragments(list_requested_files(Settings(), folder), texts, head)
     cloud = folder / "points.xyz"
     np.savetxt(cloud, np.concatenate(points), fmt="%.3f")
     (folder / "run.json").write_text(json.dumps({"inputs": {"clouds": [str(cloud)]}}))

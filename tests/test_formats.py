@@ -24,8 +24,9 @@ from hiproof.write.attribute_list import files_text
 from hiproof.write.citygml.version3 import CityGML3Writer
 from hiproof.write.fragments import Fragment
 from hiproof.write.head import FileHead
-from hiproof.write.run_files import fragments, join_fragments, write_all
+from hiproof.write.run_files import fragments, join_fragments
 from hiproof.write.writer import BuildingWriter
+from written_run import write_all
 
 README = Path(__file__).parents[1] / "README.md"
 

@@ -20,10 +20,11 @@ from hiproof.model.roof_figures import roof_figures
 from hiproof.parametric.finished import load_postgis
 from hiproof.parametric.run import build_file
 from hiproof.read.outlines.footprints import footprint_crs, read_footprints
-from hiproof.write import write_all, write_parameters
+from hiproof.write import write_parameters
 from postgis_server import explain_absence, running
 from sample_models import write_sample_run
 from sample_parameters import RING, YARD
+from written_run import write_all
 
 DOCS = Path(__file__).parents[1] / "docs"
 psycopg = pytest.importorskip("psycopg", reason="the extra `postgis` is not installed")

@@ -1,5 +1,6 @@
 """The files of a run written of given buildings, and built again of their parameters."""
 
+from contextlib import ExitStack
 from functools import cache
 from pathlib import Path
 
@@ -13,7 +14,9 @@ from hiproof.parametric.run import build_file
 from hiproof.read.models.solids import read_solids
 from hiproof.settings import Settings
 from hiproof.write import FileHead, fragments, join_fragments
+from hiproof.write.fragments import describe
 from hiproof.write.naming import gml_name
+from hiproof.write.run_files import make_writer, measure_or_drop_solid
 
 MODELS = (".gml", ".jsonl")
 SCHEMAS = Path(__file__).parents[2] / "shared/schemas"
@@ -59,3 +62,19 @@ def list_faults(folder, buildings, write):
     build_file(folder / "parameters.jsonl", folder / "again")
     again = [p for p in paths if (folder / "again" / p.name).read_bytes() != p.read_bytes()]
     return faults + again
+
+
+def write_all(folder, buildings, crs=None):
+    """Write the four default files of a run; return the ids of buildings with a broken solid."""
+    broken, head = [], FileHead(crs)
+    with ExitStack() as stack:
+        files = list_requested_files(Settings(), Path(folder))
+        writers = [
+            stack.enter_context(make_writer(name, path, head)) for name, path in files.items()
+        ]
+        for building in buildings:
+            sheet = describe(*measure_or_drop_solid(building), head)
+            broken += [] if sheet.building is building else [building.id]
+            for writer in writers:
+                writer.add(sheet)
+    return broken

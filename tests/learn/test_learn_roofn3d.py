@@ -4,12 +4,12 @@ import csv
 
 import numpy as np
 import pytest
+from benchmarks.samples import training_sample
 
 from hiproof.errors import InputError
 from hiproof.learn.data import BUILDINGS_FILE, SURFACES_FILE, TRAINING_TYPES, open_source
 from hiproof.learn.sample import TEST, TRAINING
 from hiproof.segment.inference import NOT_ROOF
-from hiproof.simulate import training_sample
 
 CLASSES = {"gable": "Saddleback roof", "hip": "Two-sided hip roof", "pyramid": "Pyramid roof"}
 OUTLINE = "MULTIPOLYGON(((0 0,9 0,9 9,0 9,0 0)))"

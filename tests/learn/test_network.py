@@ -6,6 +6,8 @@ import pytest
 torch = pytest.importorskip("torch", reason="needs the extra `train` (torch)")
 onnx = pytest.importorskip("onnx", reason="needs the extra `train` (onnx)")
 
+from benchmarks.samples import training_sample  # noqa: E402
+
 from hiproof.errors import InputError  # noqa: E402
 from hiproof.learn.export import export, read_weights  # noqa: E402
 from hiproof.learn.network import (  # noqa: E402
@@ -16,7 +18,6 @@ from hiproof.learn.network import (  # noqa: E402
 from hiproof.learn.sample import ACROSS_AXES, ALONG_AXES, AugmentSettings, symmetric, vary_cloud  # noqa: E402
 from hiproof.segment.arrange import Layout, arrange  # noqa: E402
 from hiproof.segment.inference import SHIPPED_WEIGHTS, load, run  # noqa: E402
-from hiproof.simulate import training_sample  # noqa: E402
 
 pytestmark = pytest.mark.train
 

@@ -9,13 +9,14 @@ torch = pytest.importorskip("torch", reason="needs the extra `train` (torch)")
 pytest.importorskip("onnx", reason="needs the extra `train` (onnx)")
 pytest.importorskip("matplotlib", reason="needs the extra `train` (matplotlib)")
 
+from benchmarks.samples import training_sample  # noqa: E402
+
 from hiproof.errors import InputError, OutputError, SettingsError  # noqa: E402
 from hiproof.learn import TrainSettings, train  # noqa: E402
 from hiproof.learn.training import Trainer, open_source  # noqa: E402
 from hiproof.segment import segment  # noqa: E402
 from hiproof.segment.arrange import Layout  # noqa: E402
 from hiproof.settings import Settings  # noqa: E402
-from hiproof.simulate import training_sample  # noqa: E402
 
 pytestmark = pytest.mark.train
 

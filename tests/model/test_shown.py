@@ -20,10 +20,10 @@ from hiproof.model.heights import find_highest
 from hiproof.model.roof_figures import roof_figures
 from hiproof.model.shown import share_surface
 from hiproof.status import Status
-from hiproof.write import write_all
 from hiproof.write.building_attributes import osm_tags
 from hiproof.write.tables.rows import part_rows
 from roof_zoo import FRAME, KINDS, generate_roof
+from written_run import write_all
 
 SNAPPED_M = 0.05  # composing moves edges by less than this
 

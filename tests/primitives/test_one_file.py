@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import test_laws as laws
+from benchmarks.samples import training_sample
 
 import hiproof
 from hiproof.compose import check_solid
@@ -16,7 +17,7 @@ from hiproof.errors import InputError
 from hiproof.parametric.schema import schema
 from hiproof.primitives import CATALOGUE
 from hiproof.segment import combine
-from hiproof.simulate import ScanSettings, random_building, scan, training_sample
+from hiproof.simulate import ScanSettings, random_building, scan
 from hiproof.write.building_attributes import osm_shape
 from hiproof.write.citygml.version2 import roof_type_code
 from hiproof.write.colours import ROOF_COLOURS, type_colour

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from benchmarks.samples import training_sample
 
 from hiproof.segment.arrange import Layout, arrange
 from hiproof.segment.sampling import (
@@ -11,7 +12,6 @@ from hiproof.segment.sampling import (
     arrange_cloud,
     thin_to_grid,
 )
-from hiproof.simulate import training_sample
 
 COUNT, LEVELS, GROUP = 64, (32, 16, 8), 8
 LAYOUT = Layout(points=COUNT, levels=LEVELS, neighbours=GROUP)

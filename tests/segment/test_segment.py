@@ -6,13 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks.samples import training_sample
 
 from hiproof.errors import FitError, InputError, SettingsError
 from hiproof.fit import fit_roof
 from hiproof.segment import NOT_ROOF, Segmentation, choose_most_probable, inference, segment
 from hiproof.segment.inference import SHIPPED_WEIGHTS, carried_back, load
 from hiproof.settings import Settings
-from hiproof.simulate import ROOF_TYPES, training_sample
+from hiproof.simulate import ROOF_TYPES
 
 REAL_ROOFS = Path(__file__).parents[2] / ".." / "shared" / "data" / "roofn3d" / "labelled"
 AS_GABLE = {"asymmetric_gable": "gable"}

@@ -5,6 +5,7 @@ import csv
 import laspy
 import numpy as np
 import pytest
+from benchmarks.samples import training_sample
 from click.testing import CliRunner
 
 from hiproof.cli.app import import_command
@@ -12,7 +13,6 @@ from hiproof.errors import InputError, OutputError
 from hiproof.segment import segment
 from hiproof.segment.files import segment_files
 from hiproof.settings import Settings
-from hiproof.simulate import training_sample
 
 
 def write_cloud(path, seed, shift=(85_000.0, 446_000.0, 10.0)):

@@ -7,6 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 import shapely
+from benchmarks.samples import training_sample
 
 from hiproof.errors import InputError
 from hiproof.model import Piece, Solid
@@ -19,7 +20,6 @@ from hiproof.simulate import (
     random_building,
     scan,
     scan_solids,
-    training_sample,
     uniform_points,
 )
 from hiproof.simulate.flight import Swath, make_beams

@@ -13,10 +13,10 @@ from hiproof.frames import METRES, Units
 from hiproof.primitives import CATALOGUE
 from hiproof.primitives.family import COMPONENTS
 from hiproof.primitives.parameters import list_parameters, list_side_parameters
-from hiproof.write import write_all
 from hiproof.write.attribute_list import OWN, PREFIX, TABLES
 from hiproof.write.building_attributes import building_attributes, measure_figures
 from hiproof.write.parameters import FileHead, building_record, head_record
+from written_run import write_all
 
 DOCUMENT = Path(__file__).parents[2] / "docs/attributes.md"
 KINDS = {"number": (int, float), "count": int, "text": str}

@@ -13,10 +13,10 @@ from lxml import etree
 
 import hiproof
 from hiproof.primitives import CATALOGUE
-from hiproof.write import roof_figures, write_all
+from hiproof.write import roof_figures
 from hiproof.write.citygml.version2 import NAMESPACES
 from hiproof.write.surfaces import join_values, number_surfaces
-from written_run import require_schema
+from written_run import require_schema, write_all
 
 SCHEMAS = Path(__file__).parents[3] / "shared" / "schemas"
 GML_ID = f"{{{NAMESPACES['gml']}}}id"

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from handmade import box, courtyard, gable_house, make_building, make_lost_building
-from hiproof.write import write_all
+from written_run import write_all
 
 
 @pytest.fixture(scope="module")

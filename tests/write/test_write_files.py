@@ -15,6 +15,7 @@ from hiproof import read_parameters
 from hiproof.errors import InputError, OutputError
 from hiproof.model import ROOF
 from hiproof.write.files import atomic, atomic_file, scratch
+from written_run import write_all
 
 WRITERS = {
     "buildings.gml": write.write_citygml,
@@ -141,18 +142,18 @@ def test_a_full_device_says_so(tmp_path):
 
 
 def test_a_run_writes_its_files_together_or_not_at_all(tmp_path):
-    write.write_all(tmp_path / "good", iter(street()), "EPSG:7415")
+    write_all(tmp_path / "good", iter(street()), "EPSG:7415")
     expected = ["buildings.city.jsonl", "buildings.gml", "buildings.gpkg", "parameters.jsonl"]
     assert names_in(tmp_path / "good") == expected
     with pytest.raises(AttributeError):
-        write.write_all(tmp_path / "bad", iter([*street(), "no building"]))
+        write_all(tmp_path / "bad", iter([*street(), "no building"]))
     assert names_in(tmp_path / "bad") == []
 
 
 @pytest.mark.parametrize("break_it", [no_roof, no_number, no_vertex])
 def test_a_broken_solid_does_not_stop_the_others(tmp_path, break_it):
     buildings = [*street(), make_building(break_it(gable_house()), "broken"), *street()]
-    assert write.write_all(tmp_path, buildings) == ["broken"]
+    assert write_all(tmp_path, buildings) == ["broken"]
     records = read_parameters(tmp_path / "parameters.jsonl")
     assert [r["status"] for r in records if r["id"] == "broken"] == ["internal_error"]
     assert len(records) == 9

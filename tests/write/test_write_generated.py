@@ -15,8 +15,9 @@ from hiproof.model import Building, Model, Quality, Solid
 from hiproof.primitives import CATALOGUE
 from hiproof.simulate import COMPOUND_KINDS, ROOF_TYPES, random_building, random_compound
 from hiproof.status import Status
-from hiproof.write import roof_figures, write_all
+from hiproof.write import roof_figures
 from hiproof.write.citygml.version2 import NAMESPACES
+from written_run import write_all
 
 
 def generate_buildings(seed):

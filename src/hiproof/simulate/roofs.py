@@ -149,33 +149,6 @@ def find_largest_part(roof: Roof) -> Part:
     return max(roof.parts, key=lambda part: part.area)
 
 
-def read_truth(truth: dict) -> SimBuilding:
-    """Read the building whose `SimBuilding.truth` was written to a file.
-
-    Raises InputError for anything else.
-
-    >>> building = random_building(np.random.default_rng(3), "mansard")
-    >>> read_truth(building.truth()).outline.equals_exact(building.outline, 1e-9)
-    True
-    """
-    try:
-        parts = tuple(
-            make_part(
-                part["type"],
-                part["parameters"],
-                part["kappa"],
-                np.array(part["translation"], float),
-            )
-            for part in truth["parts"]
-        )
-        return assemble(parts, truth["kind"], truth["origin"])
-    except (KeyError, TypeError, ValueError) as error:
-        raise InputError(
-            f"expected a building's truth as the simulator writes it, got: {error!r}; give a line "
-            "of truth.jsonl"
-        ) from error
-
-
 def turn_building(building: SimBuilding, angle: float) -> SimBuilding:
     """Turn a building by `angle` (rad) about its frame's origin."""
     parts = []

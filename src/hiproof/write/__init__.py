@@ -31,7 +31,7 @@ from .files import atomic, atomic_file
 from .fragments import Fragments, load_fragments, save_fragments
 from .head import FileHead
 from .parameters import ParametersWriter, write_parameters
-from .run_files import fragments, join_fragments, write_all
+from .run_files import fragments, join_fragments
 from .tables.geopackage import AttributesWriter, write_attributes
 from .writer import BuildingWriter
 
@@ -52,7 +52,6 @@ __all__ = [
     "load_fragments",
     "roof_figures",
     "save_fragments",
-    "write_all",
     "write_attributes",
     "write_citygml",
     "write_cityjson",

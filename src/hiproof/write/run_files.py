@@ -7,7 +7,6 @@ once, in a worker, and `join_fragments` only puts texts one after the other.
 from __future__ import annotations
 
 import dataclasses
-import os
 from collections.abc import Iterable
 from contextlib import ExitStack
 from pathlib import Path
@@ -15,10 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from ..formats import FORMATS, import_format, list_requested_files, requested_fragments
+from ..formats import FORMATS, import_format, requested_fragments
 from ..model import Building
 from ..model.roof_figures import RoofFigures
-from ..settings import Settings
 from ..status import Status
 from .building_attributes import measure_figures
 from .fragments import Fragments, Sheet, describe
@@ -26,34 +24,6 @@ from .head import FileHead
 from .meshes.viewed import view_building
 from .parameters import crs_text
 from .writer import BuildingWriter
-
-
-def write_all(
-    folder: str | os.PathLike, buildings: Iterable[Building], crs: Any = None
-) -> list[str]:
-    """Write the four default files of a run to `folder`.
-
-    They are buildings.gml, buildings.city.jsonl, parameters.jsonl and buildings.gpkg.
-
-    `buildings` may be a generator; `crs` is anything pyproj understands or None. Returns the ids of
-    buildings whose solid turned out to be broken: they are written without it, as internal errors,
-    and do not stop the others. When anything else goes wrong before the last building none of the
-    files appears and older ones stay. Raises OutputError when the folder cannot be written.
-    """
-    broken, head = [], FileHead(crs)
-    with ExitStack() as stack:
-        files = list_requested_files(Settings(), Path(folder))
-        # The table does most of its work at the end: entered last it is closed first, and its
-        # failure stops the others.
-        writers = [
-            stack.enter_context(make_writer(name, path, head)) for name, path in files.items()
-        ]
-        for building in buildings:
-            sheet = describe(*measure_or_drop_solid(building), head)
-            broken += [] if sheet.building is building else [str(building.id)]
-            for writer in writers:
-                writer.add(sheet)
-    return broken
 
 
 def make_writer(name: str, path: Path, head: FileHead, **given: Any) -> BuildingWriter:
@@ -89,7 +59,7 @@ def fragments(
 
     `names` are its CityJSON id and its gml:id. They are those of the files that a run writes,
     `head` what these have in common, the offset of the CityJSON file included. A solid that cannot
-    be measured is left out, as in `write_all`.
+    be measured is left out.
     """
     sheet = describe(*measure_or_drop_solid(requested), head, *names)
     return sheet.building, make_texts(sheet, requested_fragments(head.write))
@@ -103,8 +73,8 @@ def make_texts(sheet: Sheet, kinds: Iterable[str]) -> Fragments:
 def join_fragments(files: dict[str, Path], parts: Iterable[Fragments], head: FileHead) -> None:
     """Write `files` of a run from `parts`, each whole or not at all.
 
-    They are as `write_all` would write them, without making any text. `files` are paths by format,
-    a key of FORMATS. Raises OutputError when one cannot be written.
+    No text is made. `files` are paths by format, a key of FORMATS. Raises OutputError when one
+    cannot be written.
     """
     with ExitStack() as stack:
         opened = [

@@ -44,10 +44,10 @@ class Octree(NamedTuple):
 class LasFacts:
     """The fields of the public header block, and the file's `size` in bytes.
 
-    Arrays are (3,): x, y, z. `created` are the day of a year and that year. `points_end` is the first
-    byte that no point may take: of waveforms,
-    of extended records, or the end. `laszip` is the record that tells how points are compressed;
-    only COPC has an `octree`; `projection` are the records of the CRS.
+    Arrays are (3,): x, y, z. `created` are the day of a year and that year. `points_end` is the
+    first byte that no point may take: of waveforms, of extended records, or the end. `laszip` is
+    the record that tells how points are compressed; only COPC has an `octree`; `projection` are
+    the records of the CRS.
     """
 
     size: int
