@@ -20,8 +20,8 @@ from hiproof.segment import combine, segment
 from hiproof.segment.scores import Scores
 from hiproof.settings import Settings
 from hiproof.simulate import ROOF_TYPES
-from .samples import training_sample
 
+from .samples import training_sample
 from .tables import FigureTable, make_parser
 
 TYPES = ROOF_TYPES

@@ -30,12 +30,12 @@ import numpy as np
 import shapely
 
 from hiproof import reconstruct
+from hiproof.formats import list_requested_files
 from hiproof.model import GROUND, Building, Solid
 from hiproof.read.models.solids import read_solids
+from hiproof.settings import Settings
 from hiproof.simulate import SOURCES, Defects, ScanSettings, scan_solids
 from hiproof.status import Status
-from hiproof.formats import list_requested_files
-from hiproof.settings import Settings
 from hiproof.write import FileHead, fragments, join_fragments
 
 from .judging import SHARED, describe_parts
