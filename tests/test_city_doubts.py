@@ -75,6 +75,28 @@ def row_over_half(folder, code, with_ground=True):
     return run_points(folder, *points, TOWN.footprints, terrain=terrain)[0]["house-0"]
 
 
+@pytest.mark.parametrize(
+    ("rise", "slope", "words"),
+    [
+        (3.0, 0.0, "lies 3.0 m above its own heights around it"),
+        (3.0, 0.1, "m above its own heights around it"),
+        (-2.6, 0.0, "lies 2.6 m below its own heights around it"),
+        (0.0, 0.3, ""),
+    ],
+)
+def test_a_terrain_that_rises_under_a_roof_alone_is_named(rise, slope, words, tmp_path):
+    """As where a filter left the building in: the cloud has no ground points to compare."""
+    is_roof = TOWN.classification == 6
+    (area,) = TOWN.footprints.values()
+    x, y = np.meshgrid(ORIGIN[0] - 19.5 + np.arange(80), ORIGIN[1] + 59.5 - np.arange(80))
+    inside = shapely.contains_xy(area.buffer(1.5), x, y)
+    heights = ORIGIN[2] + slope * (x - area.centroid.x) + np.where(inside, rise, 0.0)
+    terrain = write_terrain(tmp_path / "dtm.tif", heights)
+    points = TOWN.xyz[is_roof], TOWN.classification[is_roof]
+    row = run_points(tmp_path, *points, TOWN.footprints, terrain=terrain)[0]["house-0"]
+    assert words in row["detail"] and bool(words) == ("its own heights" in row["detail"])
+
+
 @pytest.mark.parametrize("code", [-9999.0, 9999.0, -32767.0, 3.4e38, 0.0, 255.0])
 def test_undeclared_codes_under_part_of_a_building_are_no_ground(tmp_path, code):
     row = row_over_half(tmp_path, code)

@@ -59,6 +59,7 @@ class Doubt(Enum):
     OTHER_SLOPE = "its points rise another way than the model"
     GROUND_ABOVE_EAVES = "m above its eaves"
     TERRAIN_UNLIKE_GROUND_POINTS = "the ground points around it"
+    TERRAIN_UNLIKE_AROUND = "its own heights around it"
     TERRAIN_WITHOUT_HEIGHTS = "holds values that are no heights"
     GROUND_GIVEN_ELSEWHERE = "the ground given lies"
     ASSUMED_GROUND = "its ground is assumed"

@@ -243,6 +243,7 @@ FAR_GROUND_M = 2.0
 or two systems.
 """
 
+ASIDE_M = 4.0  # from the corners of an outline: a raster of 2 m mixes no cell of the outline there
 OTHER_GROUND_M = 5.0
 """Difference (m) from which on the model's height is not used: height systems differ by 10 to 100
 m, codes for "no data" by more, while a model and ground points of one place agree within 2 m also
@@ -279,7 +280,8 @@ def check_terrain(model: TerrainModel, ground: Terrain, xy: np.ndarray) -> str:
     """Return a remark where the terrain model has no true height.
 
     It has none at some of the corners `xy` (n, 2) of an outline, or lies far above or below the
-    ground points there. The remark is empty otherwise.
+    ground points there, or its own heights beside them where there are none. The remark is empty
+    otherwise.
     """
     coded = model.is_coded_at(xy)
     if coded.any():
@@ -290,15 +292,16 @@ def check_terrain(model: TerrainModel, ground: Terrain, xy: np.ndarray) -> str:
             f"the {model.source} {Doubt.TERRAIN_WITHOUT_HEIGHTS.value} under {text}the building; "
             f"{use}"
         )
-    gap = model.height_at(xy) - ground.height_at(xy)
-    gap = gap[np.isfinite(gap)]
+    gap, doubt = model.height_at(xy) - ground.height_at(xy), Doubt.TERRAIN_UNLIKE_GROUND_POINTS
     is_other = np.abs(gap) > OTHER_GROUND_M
-    above = float(np.median(gap[is_other] if is_other.any() else gap)) if len(gap) else 0.0
+    if not np.isfinite(gap).any():
+        away = xy - xy.mean(axis=0)
+        beside = xy + ASIDE_M * away / np.maximum(np.hypot(*away.T), ASIDE_M)[:, None]
+        gap, doubt = model.height_at(xy) - model.height_at(beside), Doubt.TERRAIN_UNLIKE_AROUND
+    gap = gap[is_other if is_other.any() else np.isfinite(gap)]
+    above = float(np.median(gap)) if len(gap) else 0.0
     if abs(above) <= FAR_GROUND_M:
         return ""
     way = "above" if above > 0 else "below"
     use = ", which are used instead" if is_other.any() else ""
-    return (
-        f"the {model.source} lies {abs(above):.1f} m {way} "
-        f"{Doubt.TERRAIN_UNLIKE_GROUND_POINTS.value}{use}"
-    )
+    return f"the {model.source} lies {abs(above):.1f} m {way} {doubt.value}{use}"
