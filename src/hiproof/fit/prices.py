@@ -10,8 +10,7 @@ from __future__ import annotations
 
 from .union.prices import DENSE_CLOUD, DENSE_GROWTH, DETAIL_FACTOR
 
-DEAD_M = 0.08  # Difference (m) that a person would leave out: it costs next to nothing.
-SMALL_GAP_POINTS = 0.015  # What it costs at most (points). It decides between equals.
+DEAD_M = 0.08  # Difference (m) that a person would leave out: it costs nothing.
 VOLUME_UNITS = 0.5  # A visible volume.
 UNKNOWN_UNITS = 0.45  # A height or a slope, however many planes share it.
 SKEW_UNITS = 0.1  # A plane that is not square to the first of its volume, but nearly.

@@ -43,7 +43,7 @@ from .tables import (
     LEVEL_EAVES,  # all sloping planes of volume a rise from its sides at one height, with one slope
     # if b, and from all walls that cut its corners off if c
     TILT,  # the level plane b of volume a rises from its side c
-    MAKE_LEVEL,  # plane b of volume a becomes level
+    MAKE_LEVEL,  # plane b of volume a becomes level, and its only one if c
     ADD_BAY,  # a level volume over bay a of the outline
     ONE_PLANE,  # plane b of volume a becomes plane d of volume c
     COVER,  # side b of volume a on line c of the outline, with all planes from its walls' eaves,
@@ -95,7 +95,8 @@ def list_moves(roof, site, asked, moves):
             if roof.n_planes[k] > 1 and not site.keeps_shapes:
                 count = write_move(moves, count, LEAVE_PLANE, k, p, 0, 0)
             if roof.slopes[k, p] >= 0:
-                count = write_move(moves, count, MAKE_LEVEL, k, p, 0, 0)
+                for alone in range(2 if roof.n_planes[k] > 1 else 1):
+                    count = write_move(moves, count, MAKE_LEVEL, k, p, alone, 0)
                 for q in range(roof.n_planes[k]):
                     if roof.slopes[k, q] >= 0 and roof.heights[k, q] != roof.heights[k, p]:
                         count = write_move(moves, count, TO_EAVE, k, p, roof.heights[k, q], 0)
@@ -428,6 +429,9 @@ def change_plane(roof, move, site):
         row = roof.planes[k, b]
         roof.heights[k, b] = add_unknown(roof, row[0] * x + row[1] * y + row[2])
         roof.slopes[k, b] = NO_UNKNOWN
+        for p in range(roof.n_planes[k] - 1 if c else -1, -1, -1):
+            if p != b:
+                drop_plane(roof, k, p)
     else:
         return False
     return True

@@ -17,7 +17,6 @@ from ..prices import (
     LACK_UNITS,
     NARROW_M,
     SKEW_UNITS,
-    SMALL_GAP_POINTS,
     UNKNOWN_UNITS,
     VOLUME_UNITS,
 )
@@ -109,10 +108,7 @@ def compute_costs(roof, site, view, points):
     heights, _, n = compute_judged_heights(roof, site, view, points)
     costs = np.empty(len(points))
     for m in range(n):
-        z = site.z[points[m]]
-        gap = min(abs(z - heights[m]), site.dead) / site.dead
-        costs[m] = compute_point_cost(z, heights[m], site.dead, site.width)
-        costs[m] += SMALL_GAP_POINTS * gap * gap
+        costs[m] = compute_point_cost(site.z[points[m]], heights[m], site.dead, site.width)
     for m in range(n, len(points)):
         i = points[m]
         costs[m] = compute_cell_cost(heights[m], site.weight[i], site.shade[i], site.low, site.high)

@@ -22,7 +22,6 @@ from ..direction import outline_rectangle
 from ..prices import (
     CORNER_UNITS,
     DEAD_M,
-    SMALL_GAP_POINTS,
     UNKNOWN_UNITS,
     VOLUME_UNITS,
     compute_unit,
@@ -111,9 +110,8 @@ class PartsRoof:
 
     def price_gaps(self, gaps: np.ndarray) -> np.ndarray:
         """Return what distances in height (n,) cost."""
-        gaps = np.abs(gaps)
-        beyond = np.clip((gaps - DEAD_M) / (self.tolerance_m - DEAD_M), 0.0, 1.0)
-        return beyond**2 + SMALL_GAP_POINTS * np.minimum(gaps / DEAD_M, 1.0) ** 2
+        beyond = (np.abs(gaps) - DEAD_M) / (self.tolerance_m - DEAD_M)
+        return np.clip(beyond, 0.0, 1.0) ** 2
 
 
 def make_parts_roof(
