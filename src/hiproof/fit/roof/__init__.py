@@ -12,6 +12,7 @@ moves       compiled: moves of a roof, which propose and do not judge
 accept      compiled: the one place that judges, and the loop
 site        what a roof has to explain: points, cells, the outline and its lines
 start       the tables of the volumes that the search found
+copies      compiled: volumes copied along a side to where points are unexplained
 add         volumes added where points are unexplained
 beside      how far the points lie beside the outline
 deviations  compiled: how well points determine unknowns and sides

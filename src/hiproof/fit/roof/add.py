@@ -1,8 +1,9 @@
 """Add volumes where a roof leaves points unexplained.
 
 The search takes some of the points of a large or dense roof. Where many are unexplained, planes
-are found again among these, each with the rectangle in which it gains most. A new volume joins the
-others or replaces them. It is kept if the roof with it, improved, is cheaper.
+are found again among these, each with the rectangle in which it gains most, and volumes nearby are
+copied. A new volume joins the others or replaces them. It is kept if the roof with it, improved, is
+cheaper.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from ..union.volumes import DIRECTION, REPLACES, U0
 from ..union.whole import Box, Whole
 from ..union.window import open_window
 from .accept import LEAST_UNITS, improve
+from .copies import add_copy, list_copies
 from .draw import Drawing, compute_heights
 from .price import OVER_M, Site
 from .start import add_volume, put_on_walls
@@ -53,7 +55,7 @@ def add_volumes(
         scene, start, last = open_window(whole, box, EFFORT.pool_points), price, np.inf
         while scene is not None and price < last:
             last = price
-            price = add_best(roof, trial, site, drawing, scene, price)
+            price = add_best(roof, trial, site, drawing, scene, box, price)
         if price < start:
             windows.append(box)
     (x0, x1, y0, y1), near = roof.boxes.T, np.zeros(len(roof.sides), np.bool_)
@@ -82,28 +84,44 @@ def list_places(roof: Tables, site: Site) -> Iterator[Box]:
 
 
 def add_best(
-    roof: Tables, trial: Tables, site: Site, drawing: Drawing, scene: Scene, price: float
+    roof: Tables, trial: Tables, site: Site, drawing: Drawing, scene: Scene, box: Box, price: float
 ) -> float:
     """Add the volume that saves most in a window to a roof with a `price`. Returns the new one."""
     if (roof.counts + ROWS > [len(roof.sides), len(roof.lines), len(roof.values)]).any():
         return price
-    lowest = price - LEAST_UNITS * site.unit
-    best, new = None, make_tables_like(roof)
-    for volume in list_additions(roof, scene):
-        copy_tables(roof, new)
-        k = add_volume(new, volume, scene.turn)
-        put_on_walls(new, k, site, True)
+    best, lowest = roof, price - LEAST_UNITS * site.unit
+    for new, k in list_additions(roof, site, scene, box):
         asked = np.arange(len(roof.sides)) == k
         cost = improve(new, trial, site, drawing, asked, 1)
         if cost < lowest:
-            best, new, lowest = new, make_tables_like(roof), cost
-    if best is None:
+            best, lowest = new, cost
+    if best is roof:
         return price
     copy_tables(best, roof)
     return lowest
 
 
-def list_additions(roof: Tables, scene: Scene) -> Iterator[np.ndarray]:
+def list_additions(
+    roof: Tables, site: Site, scene: Scene, box: Box
+) -> Iterator[tuple[Tables, int]]:
+    """Yield roofs with one volume more in a window, and its number: a copy or a new one."""
+    for source, x, y in list_copies(roof, site, np.array(box), UNEXPLAINED)[:TRIED]:
+        new = copy_roof(roof)
+        yield new, add_copy(new, int(source), x, y)
+    for volume in list_volumes(roof, scene):
+        new = copy_roof(roof)
+        k = add_volume(new, volume, scene.turn)
+        put_on_walls(new, k, site, True)
+        yield new, k
+
+
+def copy_roof(roof: Tables) -> Tables:
+    new = make_tables_like(roof)
+    copy_tables(roof, new)
+    return new
+
+
+def list_volumes(roof: Tables, scene: Scene) -> Iterator[np.ndarray]:
     """Yield volumes that may explain what a roof leaves."""
     z = find_heights(roof, scene.U[0], scene.V[0])
     costs = compute_costs(z, scene)
