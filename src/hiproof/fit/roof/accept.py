@@ -52,47 +52,74 @@ FIRST_JUDGES = 400  # Most points of a box that judge a move first. Of more, eve
 
 
 @compiled
-def measure_change(roof, trial, changed, site, box):
-    """Set `box` to what the `changed` volumes take up before and after a move."""
-    box[0], box[1], box[2], box[3] = np.inf, -np.inf, np.inf, -np.inf
+def list_changes(roof, trial, changed, site, boxes):
+    """Set `boxes` (v, 4) to what the `changed` volumes take up before and after a move.
+
+    Those whose surroundings meet are one. Returns how many there are.
+    """
+    count = 0
     for k in range(trial.counts[VOLUME_COUNT]):
         if not changed[k]:
             continue
+        box = boxes[count]
+        box[0], box[1], box[2], box[3] = np.inf, -np.inf, np.inf, -np.inf
         if k < roof.counts[VOLUME_COUNT] and roof.n_planes[k] > 0:
             widen_box(box, roof.boxes[k])
         if trial.n_planes[k] > 0:
             widen_box(box, trial.boxes[k])
-    for axis in range(2):
-        low, high = 2 * axis, 2 * axis + 1
-        box[low] = max(box[low], site.bounds[low]) - CHANGE_MARGIN_M
-        box[high] = min(box[high], site.bounds[high]) + CHANGE_MARGIN_M
+        for axis in range(2):
+            low, high = 2 * axis, 2 * axis + 1
+            box[low] = max(box[low], site.bounds[low]) - CHANGE_MARGIN_M
+            box[high] = min(box[high], site.bounds[high]) + CHANGE_MARGIN_M
+        count = join_last(boxes, count + 1)
+    return count
 
 
 @compiled
-def try_move(roof, trial, move, site, drawing, known, changed, box, exact):
+def join_last(boxes, count):
+    """Join the last of `count` boxes with those near it. Returns how many are left."""
+    j = 0
+    while j < count - 1:
+        last = boxes[count - 1]
+        if is_near(boxes[j], last, 2.0 * BESIDE_M):
+            widen_box(last, boxes[j])
+            boxes[j] = boxes[count - 2]
+            boxes[count - 2] = last
+            count, j = count - 1, 0
+        else:
+            j += 1
+    return count
+
+
+@compiled
+def try_move(roof, trial, move, site, drawing, known, changed, room, exact):
     """Apply a move to a copy of the roof, fit it, and return what it saves (points).
 
-    `trial`, `changed` and `box` are set. A move that is not possible saves nothing. Unless it is to
-    be `exact`, a sample of the points judges, but not what saves as little as the sample errs.
+    `trial` and `changed` are set, and boxes (n, 4) in `room` (v, 4), which are returned: the move
+    changes nothing beyond. One that is not possible saves nothing. Unless it is to be `exact`, a
+    sample of the points judges, but not what saves as little as the sample errs.
     """
     copy_tables(roof, trial)
     if not has_room(trial) or not apply_move(trial, move, site, changed):
-        return 0.0
-    measure_change(roof, trial, changed, site, box)
-    view, points = list_view(trial, box), list_points(site, box)
+        return 0.0, room[:0]
+    boxes = room[: list_changes(roof, trial, changed, site, room)]
+    view, points = list_view(trial, boxes), list_points(site, boxes)
     if len(view) == 0:
-        return 0.0
-    units, weight = count_known_units(known, widen(box, BESIDE_M)), 1.0
+        return 0.0, boxes
+    units, weight = known.units[0], 1.0
+    for box in boxes:
+        units += count_known_units(known, widen(box, BESIDE_M))
     units += price_widths(roof, trial, site) - price_widths(trial, roof, site)
     if len(points) > FIRST_JUDGES and not exact and move[0] != SHARE and move[0] != TO_POINTS:
         step = 1 + (len(points) - 1) // FIRST_JUDGES
         weight, points = len(points) / len(points[::step]), points[::step].copy()
-    return judge(trial, site, drawing, view, box, points, weight, known.costs, units)
+    gain = judge(trial, site, drawing, view, boxes, points, weight, known.costs, units)
+    return gain, boxes
 
 
 @compiled
-def judge(trial, site, drawing, view, box, points, weight, costs, units):
-    """Fit a trial in a box to points, each for `weight`, and return what it saves (points).
+def judge(trial, site, drawing, view, boxes, points, weight, costs, units):
+    """Fit a trial in boxes to points, each for `weight`, and return what it saves (points).
 
     `costs` (n + g,) and `units` are those of the roof as it is.
     """
@@ -100,23 +127,23 @@ def judge(trial, site, drawing, view, box, points, weight, costs, units):
     hope = limit + HOPE_UNITS * site.unit
     if weight * price_misfit(trial, site, view, points) > hope:
         return 0.0
-    places, count = list_unknowns(trial, site, box)
+    places, count = list_unknowns(trial, site, boxes)
     fit_unknowns(trial, site, view, points, places, count, FIT_ROUNDS)
-    new_misfit = weight * price_misfit(trial, site, view, points)
-    if new_misfit >= limit:
-        return 0.0
-    return (
-        limit - new_misfit - site.unit * price_drawing(trial, drawing, site, widen(box, BESIDE_M))
-    )
+    gain = limit - weight * price_misfit(trial, site, view, points)
+    for box in boxes:
+        if gain <= 0.0:
+            return 0.0
+        gain -= site.unit * price_drawing(trial, drawing, site, widen(box, BESIDE_M))
+    return gain
 
 
 @compiled
 def fit_roof(roof, site, rounds):
     """Fit all unknowns of a roof to all points, unless that costs more."""
-    box = np.array([-np.inf, np.inf, -np.inf, np.inf])
-    view, points = list_view(roof, box), list_points(site, box)
+    boxes = np.array([[-np.inf, np.inf, -np.inf, np.inf]])
+    view, points = list_view(roof, boxes), list_points(site, boxes)
     values, misfit = roof.values.copy(), price_misfit(roof, site, view, points)
-    places, count = list_unknowns(roof, site, box)
+    places, count = list_unknowns(roof, site, boxes)
     fit_unknowns(roof, site, view, points, places, count, rounds)
     if price_misfit(roof, site, view, points) > misfit:
         roof.values[:] = values
@@ -144,7 +171,7 @@ def improve(roof, trial, site, drawing, asked, rounds):
     Returns its price (points).
     """
     size = len(roof.sides)
-    changed, box = np.zeros(size, np.bool_), np.empty(4)
+    changed, room = np.zeros(size, np.bool_), np.empty((size, 4))
     questions, touched = np.where(asked, ALL_MOVES, NO_MOVES), np.zeros(size, np.int64)
     moves, gains = np.empty((MOST_MOVES, MOVE_COLUMNS), np.int64), np.empty(MOST_MOVES)
     lowest, least = np.inf, LEAST_UNITS * site.unit
@@ -157,18 +184,22 @@ def improve(roof, trial, site, drawing, asked, rounds):
         lowest = price
         count = list_moves(roof, site, questions, moves)
         for m in range(count):
-            gains[m] = try_move(roof, trial, moves[m], site, drawing, known, changed, box, False)
-        order = np.argsort(-gains[:count])
+            gains[m], _ = try_move(
+                roof, trial, moves[m], site, drawing, known, changed, room, False
+            )
+        order = np.argsort(-gains[:count], kind="mergesort")
         touched[:] = NO_MOVES
         for q in range(count):
             m = order[q]
             if gains[m] <= least:
                 break
-            if try_move(roof, trial, moves[m], site, drawing, known, changed, box, True) <= least:
+            move = moves[m]
+            gain, boxes = try_move(roof, trial, move, site, drawing, known, changed, room, True)
+            if gain <= least:
                 continue
-            note_touched(roof, trial, changed, moves[m, 0] == SHARE, touched)
+            note_touched(roof, trial, changed, move[0] == SHARE, touched)
             copy_tables(trial, roof)
-            known = know_change(roof, drawing, site, box, widen(box, BESIDE_M), known)
+            known = know_change(roof, drawing, site, boxes, BESIDE_M, known)
         if not touched.any():
             return price
         place = 0

@@ -21,7 +21,7 @@ def list_copies(roof, site, box, unexplained):
     The first makes that volume explain most of the points in the box that cost more than
     `unexplained`, counting what they then cost.
     """
-    points = list_points(site, box)
+    points = list_points(site, box.reshape(1, 4))
     points = points[: np.searchsorted(points, site.n)]
     costs = compute_costs(roof, site, np.arange(roof.counts[VOLUME_COUNT]), points)
     points, costs = points[costs > unexplained], costs[costs > unexplained]
@@ -42,7 +42,7 @@ def list_copies(roof, site, box, unexplained):
                     gains[count] = gain
                     found[count, 0], found[count, 1], found[count, 2] = k, x, y
             count += gains[count] > 0.0
-    return found[:count][np.argsort(-gains[:count])]
+    return found[:count][np.argsort(-gains[:count], kind="mergesort")]
 
 
 @compiled

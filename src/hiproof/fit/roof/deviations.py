@@ -15,6 +15,7 @@ from .price import (
     list_points,
     list_view,
     sum_normal_equations,
+    widen,
 )
 from .tables import (
     FAR_M,
@@ -61,8 +62,8 @@ def estimate_covariance(roof: Tables, site) -> tuple[Tables, np.ndarray]:
     planes by themselves would lie elsewhere, further than noise explains.
     """
     free, shared, pairs = free_planes(roof)
-    box = np.array([-np.inf, np.inf, -np.inf, np.inf])
-    view, points, n = list_view(free, box), list_points(site, box), len(shared)
+    boxes = np.array([[-np.inf, np.inf, -np.inf, np.inf]])
+    view, points, n = list_view(free, boxes), list_points(site, boxes), len(shared)
     matrix, vector = np.zeros((n, n)), np.zeros(n)
     explained, squares = sum_normal_equations(
         free, site, view, points, np.arange(n), matrix, vector
@@ -143,8 +144,8 @@ def estimate_side_sigmas(roof, inner, outer, site, k, anchored):
     sigmas = np.full(N_SIDES, np.inf)
     if roof.boxes[k, 1] - roof.boxes[k, 0] >= FAR_M:
         return np.zeros(N_SIDES)
-    box = roof.boxes[k] + np.array([-MOVED_M, MOVED_M, -MOVED_M, MOVED_M])
-    view, points = list_view(roof, box), list_points(site, box)
+    boxes = widen(roof.boxes[k], MOVED_M).reshape(1, 4)
+    view, points = list_view(roof, boxes), list_points(site, boxes)
     moved = (np.arange(2 * MOVES + 1) - MOVES) * MOVED_M / MOVES
     for s in range(N_SIDES):
         move_side(roof, inner, k, s, -MOVED_M)

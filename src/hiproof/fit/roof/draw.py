@@ -368,7 +368,7 @@ def list_places(drawing, box):
                 xs[count], ys[count] = x, y
                 count += 1
     xs, ys = xs[:count], ys[:count]
-    order, is_used, kept = np.argsort(xs), np.zeros(count, np.bool_), 0
+    order, is_used, kept = np.argsort(xs, kind="mergesort"), np.zeros(count, np.bool_), 0
     out_x, out_y = np.empty(count), np.empty(count)
     for s in range(count):
         i = order[s]

@@ -49,7 +49,7 @@ def find_end(roof, k, s, site, leans):
         places = across - lean * along
         if bound_right(places, is_on, n_on) <= best:
             continue
-        order = np.argsort(places)
+        order = np.argsort(places, kind="mergesort")
         right = n_on
         for i in range(count - 1):
             right += -1 if is_on[order[i]] else 1

@@ -185,7 +185,7 @@ def list_shares(roof, site, asked, moves, count):
                 widen_box(boxes[u], roof.boxes[k])
                 kinds[u] = kind
                 is_asked[u] |= asked[k] > NO_MOVES
-    order = np.argsort(roof.values[:n])
+    order = np.argsort(roof.values[:n], kind="mergesort")
     for i in range(n):
         found = 0
         for j in range(i + 1, n):

@@ -29,6 +29,7 @@ from .draw import (
     is_near,
     list_corners,
     meets,
+    widen_box,
 )
 from .steps import list_steps
 from .tables import LINE_COUNT, N_SIDES, ONE_PLANE, UNKNOWN_COUNT, VOLUME_COUNT, place_planes
@@ -65,19 +66,42 @@ units of each, and the units (2,) of its tables and of what its volumes lack in 
 
 
 @compiled
-def list_view(roof, box):
-    """Return the numbers of the volumes that reach into a box, or to the points in it."""
+def list_view(roof, boxes):
+    """Return the numbers of volumes that reach into one of the boxes (n, 4), or to its points."""
     out, count = np.empty(roof.counts[VOLUME_COUNT], np.int64), 0
     for k in range(roof.counts[VOLUME_COUNT]):
-        if roof.n_planes[k] > 0 and is_near(roof.boxes[k], box, OVER_M):
-            out[count] = k
-            count += 1
+        for box in boxes:
+            if roof.n_planes[k] > 0 and is_near(roof.boxes[k], box, OVER_M):
+                out[count] = k
+                count += 1
+                break
     return out[:count]
 
 
 @compiled
-def list_points(site, box):
-    """Return the numbers of the points and cells in a box."""
+def list_points(site, boxes):
+    """Return the numbers of the points and cells in any of the boxes (n, 4)."""
+    points = list_points_in_box(site, join_boxes(boxes))
+    if len(boxes) == 1:
+        return points
+    is_inside = np.zeros(len(points), np.bool_)
+    for x0, x1, y0, y1 in boxes:
+        x, y = site.x[points], site.y[points]
+        is_inside |= (x > x0) & (x < x1) & (y > y0) & (y < y1)
+    return points[is_inside]
+
+
+@compiled
+def join_boxes(boxes):
+    """Return the box around boxes (n, 4)."""
+    box = boxes[0].copy()
+    for other in boxes[1:]:
+        widen_box(box, other)
+    return box
+
+
+@compiled
+def list_points_in_box(site, box):
     first, last = np.searchsorted(site.x[: site.n], box[:2])
     first_cell, last_cell = site.n + np.searchsorted(site.x[site.n :], box[:2])
     out, count = np.empty(last - first + last_cell - first_cell, np.int64), 0
@@ -131,8 +155,9 @@ def price_drawing(roof, drawing, site, box):
 @compiled
 def draw_structure(roof, drawing, site, box):
     """Draw a box. Returns its corners (c, 2), and its steps (s, 3) with what they cost (units)."""
-    draw(roof, drawing, list_view(roof, box), site, box)
-    corners, view = list_corners(roof, drawing, box), list_view(roof, widen(box, NARROW_M))
+    draw(roof, drawing, list_view(roof, box.reshape(1, 4)), site, box)
+    view = list_view(roof, widen(box, NARROW_M).reshape(1, 4))
+    corners = list_corners(roof, drawing, box)
     return corners, list_steps(roof, drawing, view, site, box)
 
 
@@ -236,7 +261,7 @@ def know(roof, drawing, site):
     box = np.array([-np.inf, np.inf, -np.inf, np.inf])
     corners, steps = draw_structure(roof, drawing, site, box)
     return Known(
-        compute_costs(roof, site, list_view(roof, box), np.arange(len(site.x))),
+        compute_costs(roof, site, list_view(roof, box.reshape(1, 4)), np.arange(len(site.x))),
         corners,
         steps,
         price_all_units(roof, site),
@@ -244,20 +269,19 @@ def know(roof, drawing, site):
 
 
 @compiled
-def know_change(roof, drawing, site, box, wide, known):
-    """Return what is known of a roof that has changed in a box.
+def know_change(roof, drawing, site, boxes, reach, known):
+    """Return what is known of a roof that has changed in boxes (n, 4).
 
-    In a `wide` one, its steps may cost more or less.
+    So far (m) beyond these, its steps may cost more or less.
     """
-    points = list_points(site, box)
-    known.costs[points] = compute_costs(roof, site, list_view(roof, box), points)
-    corners, steps = draw_structure(roof, drawing, site, wide)
-    return Known(
-        known.costs,
-        replace_inside(known.corners, corners, wide),
-        replace_inside(known.steps, steps, wide),
-        price_all_units(roof, site),
-    )
+    points, corners, steps = list_points(site, boxes), known.corners, known.steps
+    known.costs[points] = compute_costs(roof, site, list_view(roof, boxes), points)
+    for box in boxes:
+        wide = widen(box, reach)
+        new_corners, new_steps = draw_structure(roof, drawing, site, wide)
+        corners = replace_inside(corners, new_corners, wide)
+        steps = replace_inside(steps, new_steps, wide)
+    return Known(known.costs, corners, steps, price_all_units(roof, site))
 
 
 @compiled
@@ -281,20 +305,20 @@ def lies_in(rows, m, box):
 
 @compiled
 def count_known_units(known, box):
-    """Return the units of the tables, and of the known corners and steps in a box."""
+    """Return the units of the known corners and steps in a box."""
     corners, steps = 0, 0.0
     for m in range(len(known.corners)):
         corners += lies_in(known.corners, m, box)
     for m in range(len(known.steps)):
         steps += known.steps[m, 2] if lies_in(known.steps, m, box) else 0.0
-    return known.units[0] + CORNER_UNITS * corners + steps
+    return CORNER_UNITS * corners + steps
 
 
 @compiled
 def price_known(known, site):
     """Return the price (points) of the roof that is known."""
     everywhere = np.array([-np.inf, np.inf, -np.inf, np.inf])
-    units = count_known_units(known, everywhere) + known.units[1]
+    units = known.units.sum() + count_known_units(known, everywhere)
     return known.costs.sum() + site.unit * units
 
 
@@ -372,10 +396,10 @@ def fit_unknowns(roof, site, view, points, places, count, rounds):
 
 
 @compiled
-def list_unknowns(roof, site, box):
-    """Return rows (u,) for the unknowns of which all volumes lie inside a box, and their number.
+def list_unknowns(roof, site, boxes):
+    """Return rows (u,) for unknowns whose volumes lie in the boxes (n, 4), and their number.
 
-    The others get -1: they keep their value, because points outside the box hold them.
+    The others get -1: they keep their value, because points outside the boxes hold them.
     """
     n_unknowns, bounds = roof.counts[UNKNOWN_COUNT], site.bounds
     places, count = np.zeros(n_unknowns, np.int64), 0
@@ -383,12 +407,11 @@ def list_unknowns(roof, site, box):
     for k in range(roof.counts[VOLUME_COUNT]):
         if roof.n_planes[k] == 0:
             continue
-        is_inside = (
-            max(roof.boxes[k, 0], bounds[0]) >= box[0]
-            and min(roof.boxes[k, 1], bounds[1]) <= box[1]
-            and max(roof.boxes[k, 2], bounds[2]) >= box[2]
-            and min(roof.boxes[k, 3], bounds[3]) <= box[3]
-        )
+        x0, x1 = max(roof.boxes[k, 0], bounds[0]), min(roof.boxes[k, 1], bounds[1])
+        y0, y1 = max(roof.boxes[k, 2], bounds[2]), min(roof.boxes[k, 3], bounds[3])
+        is_inside = False
+        for box in boxes:
+            is_inside |= x0 >= box[0] and x1 <= box[1] and y0 >= box[2] and y1 <= box[3]
         for p in range(roof.n_planes[k]):
             for u in (roof.heights[k, p], roof.slopes[k, p]):
                 if u >= 0:

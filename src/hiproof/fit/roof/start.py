@@ -21,7 +21,7 @@ from ..union.volumes import (
 )
 from .ends import find_end
 from .moves import LINE_COSINE
-from .price import list_points, list_view, price_misfit
+from .price import list_points, list_view, price_misfit, widen
 from .tables import (
     FAR_M,
     LINE_COUNT,
@@ -96,8 +96,8 @@ def put_on_walls(roof, k, site, is_new):
             continue
         a, b, _ = roof.half_planes[k, s]
         reach = NEAR_WALL_M + MOST_SWING * length
-        box = roof.boxes[k] + np.array([-reach, reach, -reach, reach])
-        view, points = list_view(roof, box), list_points(site, box)
+        boxes = widen(roof.boxes[k], reach).reshape(1, 4)
+        view, points = list_view(roof, boxes), list_points(site, boxes)
         start = best = roof.sides[k, s]
         lowest = price_misfit(roof, site, view, points) + site.unit * LOOSE_UNITS
         for line in site.lines:
