@@ -13,8 +13,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 
 from .judging import load_tool
 
@@ -23,6 +25,7 @@ COLUMNS = (
     "n",
     "edge F1, %: pooled; mean",
     "precision; recall, %",
+    "wrong edges on true lines, %",
     "corner F1, %",
     "corners; faces, times the truth's",
     "share in 0.2 m",
@@ -30,11 +33,15 @@ COLUMNS = (
     "ms per 100 m2",
 )
 NAN = float("nan")
+ON_LINE_M = 0.3  # Farthest (m) of an edge's ends from the line of a true one.
 
 
 @dataclass(frozen=True)
 class WireframeCounts:
-    """Counts of one building; `found_corners` are true ones near a right corner."""
+    """Counts of one building; `found_corners` are true ones near a right corner.
+
+    `wrong_on_lines` are the wrong edges that overlap a true one on its line, with other ends.
+    """
 
     right_edges: int
     edges: int
@@ -45,6 +52,7 @@ class WireframeCounts:
     found_corners: int
     faces: int = 0
     true_faces: int = 0
+    wrong_on_lines: int = 0
     offset_m: float = 0.0  # summed over right corners
     height_rmse_m: float = NAN
 
@@ -85,16 +93,37 @@ def count_wireframes(models: Path, truth: Path) -> dict[str, WireframeCounts]:
     for name, parts in judge.solids(truth).items():
         reference, model = judge.wireframe(parts), solids.get(name, [])
         if len(reference[1]):
-            comparison = judge.compare(judge.wireframe(model), reference)
+            drawn = judge.wireframe(model)
+            comparison = judge.compare(drawn, reference)
             rmse = judge.height_rmse(model, parts) if model else NAN
             numbers = (
                 *comparison["edges"],
                 *comparison["corners"],
                 comparison["found"],
                 *comparison["faces"],
+                count_wrong_on_lines(judge, drawn, reference),
             )
             counts[name] = WireframeCounts(*numbers, comparison["offset"], rmse)
     return counts
+
+
+def count_wrong_on_lines(judge: ModuleType, drawn: tuple, true: tuple) -> int:
+    """Count the wrong edges of a wireframe that overlap a true one on its line."""
+    (p, edges, _), (t, true_edges, _) = drawn, true
+    if not len(edges):
+        return 0
+    gaps = judge.edge_distances(p[edges], t[true_edges])
+    near = judge.NEAR * np.linalg.norm(t - t.mean(axis=0), axis=1).max()
+    rows, columns = linear_sum_assignment(gaps)
+    wrong = np.delete(p[edges], rows[gaps[rows, columns] <= near], axis=0)[:, None]
+    start, end = np.swapaxes(t[true_edges], 0, 1)
+    length = np.linalg.norm(end - start, axis=1)
+    way = ((end - start) / length[:, None])[:, None]
+    gone = wrong - start[:, None]
+    along = (gone * way).sum(axis=3)
+    off = np.linalg.norm(gone - along[..., None] * way, axis=3).max(axis=2)
+    overlap = np.minimum(along.max(axis=2), length) - np.maximum(along.min(axis=2), 0.0)
+    return int(((off <= ON_LINE_M) & (overlap > 0.0)).any(axis=1).sum())
 
 
 def sum_counts(counts: Iterable[WireframeCounts]) -> WireframeCounts:
@@ -145,6 +174,7 @@ def make_cells(scores: list[Score]) -> list[str]:
         f"{len(scores)}",
         f"{total.edge_f1:.1f}; {edges:.1f}",
         f"{100 * precision:.1f}; {100 * recall:.1f}",
+        f"{100 * total.wrong_on_lines / max(total.edges - right, 1):.0f}",
         f"{total.corner_f1:.1f}",
         f"{total.corners / total.true_corners:.2f}; {faces}",
         f"{np.mean([s.share for s in scores]):.4f}",
