@@ -1,6 +1,8 @@
 """Pages in a real Chromium, as large as a laptop and a phone: opened, checked, walked through."""
 
+import re
 import shutil
+import threading
 from contextlib import contextmanager
 
 import pytest
@@ -39,14 +41,42 @@ PLACED = """(viewer, corners) => {
 }"""
 
 
+# until the tiles of a view are there; a page that nobody looks at is asked for no frame
+SETTLE = """async () => {
+  await ready;
+  do { await new Promise(done => setTimeout(done, 50)); scene.paint(); } while (scene.loading);
+}"""
+
+
 @contextmanager
-def open_page(browser, address, size):
-    """A page of a size, whose scripts must not fail while it is open."""
+def serve(server):
+    """Answer requests in a thread; gives the server."""
+    with server:
+        thread = threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True)
+        thread.start()
+        yield server
+        server.shutdown()
+        thread.join()
+
+
+def is_complaint(message):
+    """Whether a script says that something is wrong, rather than the browser of its own."""
+    of_browser = re.match(r"Failed to load resource|\[\.WebGL", message.text)
+    return message.type in ("error", "warning") and not of_browser
+
+
+@contextmanager
+def open_page(browser, address, size=SIZES["laptop"], script=""):
+    """A page of a size, whose scripts must neither fail nor complain while it is open; `script`
+    runs before them.
+    """
     context = browser.new_context(viewport={"width": size[0], "height": size[1]})
+    context.add_init_script(script)
     page = context.new_page()
     page.set_default_timeout(WAIT_MS)
     faults = []
     page.on("pageerror", lambda error: faults.append(str(error)))
+    page.on("console", lambda said: faults.append(said.text) if is_complaint(said) else None)
     page.goto(address)
     yield page
     context.close()

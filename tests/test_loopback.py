@@ -6,7 +6,6 @@ import re
 import socket
 import threading
 import time
-from contextlib import contextmanager
 
 import pytest
 
@@ -14,10 +13,10 @@ from hiproof import loopback
 from hiproof.edit.desk import Desk
 from hiproof.edit.server import Server, Service
 from hiproof.view.server import make_server
+from pages import serve
 from sample_parameters import write_parameters_of_each_kind
 
 PAGES = ("edit", "view")
-POLL_S = 0.01  # between two looks whether the server shall end
 
 
 @pytest.fixture(params=PAGES)
@@ -41,16 +40,6 @@ def page(request, tmp_path, monkeypatch, capfd):
         yield server.server_port, start
     output = capfd.readouterr()
     assert output.out + output.err == ""
-
-
-@contextmanager
-def serve(server):
-    with server:
-        thread = threading.Thread(target=server.serve_forever, args=(POLL_S,), daemon=True)
-        thread.start()
-        yield
-        server.shutdown()
-        thread.join()
 
 
 def send(port, text, wait_s=20.0):
@@ -276,7 +265,7 @@ def test_closing_waits_for_an_answer_on_its_way():
             return loopback.Answer(200, b"")
 
     with loopback.LoopbackServer(Slow) as server:
-        threading.Thread(target=server.serve_forever, args=(POLL_S,), daemon=True).start()
+        threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True).start()
         port = server.server_port
         threading.Thread(
             target=send, args=(port, request(port, "/", "POST", None, "Content-Length: 0"))

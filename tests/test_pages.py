@@ -2,8 +2,6 @@
 and no complaint of axe-core.
 """
 
-import threading
-
 import numpy as np
 import pytest
 
@@ -12,7 +10,7 @@ from hiproof.evaluate.report import write_report
 from hiproof.evaluate.run import evaluate_run
 from hiproof.view.server import make_server
 from pages import (
-    SIZES,
+    SETTLE,
     at_every_size,
     is_too_wide,
     list_complaints,
@@ -20,14 +18,13 @@ from pages import (
     needs_browser,
     open_page,
     project_on_canvas,
+    serve,
 )
 from parametric_house import gable_house
 from sample_models import write_scanned_run
 
 pytestmark = [needs_browser, pytest.mark.filterwarnings("ignore::hiproof.errors.InputWarning")]
 FILLED = 0.4  # of the canvas, the least that a scene fills one way: it is whole, but not lost
-
-READY = "async () => { do await new Promise(done => setTimeout(done, 50)); while (scene.loading); }"
 
 
 @pytest.fixture(scope="module")
@@ -44,10 +41,8 @@ def report(folder):
 
 @pytest.fixture(scope="module")
 def view(folder):
-    with open_tiles(folder) as tiles, make_server(tiles, "a run") as server:
-        threading.Thread(target=server.serve_forever, daemon=True).start()
+    with open_tiles(folder) as tiles, serve(make_server(tiles, "a run")) as server:
         yield server.address
-        server.shutdown()
 
 
 def is_whole(places):
@@ -59,8 +54,7 @@ def is_whole(places):
 @at_every_size
 def test_the_viewer_shows_the_whole_scene(browser, view, size):
     with open_page(browser, view, size) as page:
-        page.evaluate("() => ready")
-        page.evaluate(READY)
+        page.evaluate(SETTLE)
         for shape in (size, size[::-1]):
             page.set_viewport_size({"width": shape[0], "height": shape[1]})
             page.wait_for_timeout(200)
@@ -87,8 +81,7 @@ def test_the_report_shows_the_whole_scene_and_a_whole_building(browser, report, 
 @at_every_size
 def test_axe_finds_nothing_in_the_viewer(browser, view, size):
     with open_page(browser, view, size) as page:
-        page.evaluate("() => ready")
-        page.evaluate(READY)
+        page.evaluate(SETTLE)
         assert not is_too_wide(page) and list_complaints(page) == []
         page.evaluate("() => show({ tile: scene.layers[0].tile, row: 0 })")
         assert "house-1" in page.inner_text("#details")
@@ -104,9 +97,8 @@ def test_axe_finds_nothing_in_the_report(browser, report, size):
 
 
 def test_the_viewer_works_by_keys(browser, view):
-    with open_page(browser, view, SIZES["laptop"]) as page:
-        page.evaluate("() => ready")
-        page.evaluate(READY)
+    with open_page(browser, view) as page:
+        page.evaluate(SETTLE)
         assert list_tab_stops(page, 2) == ["scene", "details-of"]
         page.focus("#scene")
         old_view = page.evaluate("() => [scene.azimuth, scene.elevation, scene.distance]")
@@ -127,7 +119,7 @@ def test_the_viewer_works_by_keys(browser, view):
 
 
 def test_the_report_works_by_keys(browser, report):
-    with open_page(browser, report, SIZES["laptop"]) as page:
+    with open_page(browser, report) as page:
         stops = ["mode", "find", "map", "bare: unknown, no model", "scene", "show-points", "panel"]
         result = list_tab_stops(page, 9)
         assert [name.split(":")[0] for name in result[:7]] == [name.split(":")[0] for name in stops]

@@ -1,6 +1,5 @@
 """The page in a real browser, by clicks and keys: from wrong types to a rebuilt, valid CityGML."""
 
-import threading
 import time
 
 import numpy as np
@@ -27,10 +26,8 @@ pytestmark = needs_browser
 def page_service(folder):
     """A service that answers, over a folder of the test's own."""
     service = Service(Desk(folder, "anna"))
-    with Server(service) as server:
-        threading.Thread(target=server.serve_forever, daemon=True).start()
+    with pages.serve(Server(service)):
         yield service
-        server.shutdown()
 
 
 @pytest.fixture

@@ -19,6 +19,7 @@ from hiproof.edit.desk import Desk
 from hiproof.edit.edits import EDITS_FILE, UNTOUCHED
 from hiproof.edit.server import Server, Service
 from hiproof.errors import InputError
+from pages import serve
 
 OWN = {"Host": "127.0.0.1:8000", "Content-Type": "application/json"}
 
@@ -125,13 +126,11 @@ def test_another_version_is_told_to_the_page(service):
 
 
 def test_it_listens_at_the_loopback_address_alone(service):
-    with Server(service) as server:
+    with serve(Server(service)) as server:
         assert server.server_address[0] == "127.0.0.1" and service.port == server.server_port
-        threading.Thread(target=server.serve_forever, daemon=True).start()
         with pytest.raises(InputError, match="expected a free port"):
             Server(service, server.server_port)
         answer = request(service.address, "GET", "")
-        server.shutdown()
     assert answer.status == 200
     assert "frame-ancestors 'none'" in answer.headers["Content-Security-Policy"]
     assert answer.headers["Referrer-Policy"] == "no-referrer"

@@ -1,74 +1,45 @@
-"""`hiproof view`: the page as headless Chromium shows it, and who is served what."""
+"""`hiproof view`: the page as Chromium shows it, and who is served what."""
 
 import errno
-import http.client
 import json
 import os
 import re
 import shutil
-import subprocess
-import threading
 import warnings
-from functools import partial
+from contextlib import contextmanager
 from pathlib import Path
+from urllib.request import urlopen
 
 import numpy as np
 import pytest
 
+import pages
 from hiproof.cli.convert import convert
 from hiproof.cli.evaluate import evaluate
 from hiproof.cli.report import report
 from hiproof.cli.view import open_tiles
 from hiproof.errors import HiproofError, InputError, InputWarning, OutputError
-from hiproof.loopback import LOOPBACK, LoopbackServer
-from hiproof.view.server import ViewHandler, make_server, render_page
+from hiproof.view.server import make_server
 from hiproof.write import files
 from hiproof.write.colours import SUN_STOPS, UNKNOWN_COLOUR, page_colours, srgb
 from hiproof.write.meshes.tiles import write_models
 from hiproof.write.meshes.viewed import ViewedModel
-from pages import BROWSER, needs_browser
+from pages import needs_browser
 from sample_models import ORIGIN, SOLIDS, two_parts, write_sample_run
 
-WAIT = """<script>
-// Painting by hand: a page that nobody looks at is asked for no frame while the machine is busy.
-async function settled() {
-  do { await new Promise(done => setTimeout(done, 50)); scene.paint(); } while (scene.loading);
-}
-</script>"""
-UNTIL_SETTLED = WAIT + "<script>ready.then(() => scene && settled());</script>"
-ACT = (
-    WAIT
-    + """<script>
-const faults = [], say = {}, told = () => document.getElementById("details").innerText;
-window.addEventListener("error", event => faults.push(String(event.message)));
-for (const level of ["error", "warn"]) console[level] = (...texts) => faults.push(texts.join(" "));
-HTMLCanvasElement.prototype.setPointerCapture = () => {};  // knows no pointers that scripts invent
-function click([x, y]) {
-  const box = scene.canvas.getBoundingClientRect();
-  for (const kind of ["pointerdown", "pointerup"]) scene.canvas.dispatchEvent(
-    new PointerEvent(kind,
-      { clientX: box.left + x, clientY: box.top + y, button: 0, buttons: 1, pointerId: 1 }));
-}
-(async () => {
-  await ready; await settled();
-  say.webgl = Boolean(scene.gl); say.tiles = scene.layers.length;
-  say.legend = document.getElementById("legend").innerText;
-  const { corners, owner } = scene.layers[0].tile, row = owner.length - 1;
-  // of the first building's roof
-  const top = [0, 1, 2].map(k => (corners[k] + corners[3 + k] + corners[6 + k]) / 3);
-  click(scene.project(top)); say.clicked = told();
-  click([2, scene.canvas.clientHeight - 2]); say.kept = told();
-  document.dispatchEvent(new KeyboardEvent("keydown", { key: "Escape" })); say.cleared = told();
-  scene.target[0] += 1e6; scene.paint();
-  say.away = scene.layers.filter(layer => layer.visible).length;
-  document.dispatchEvent(new KeyboardEvent("keydown", { key: "Home" })); scene.paint();
-  say.home = scene.layers.filter(layer => layer.visible).length;
-  say.faults = faults;
-  document.body.append(Object.assign(document.createElement("pre"),
-    { id: "said", textContent: JSON.stringify(say) }));
-})();
-</script>"""
-)
+# of a layer's first roof, in the canvas
+TOP = """() => { const { corners } = scene.layers[0].tile;
+  return scene.project([0, 1, 2].map(k => (corners[k] + corners[3 + k] + corners[6 + k]) / 3)); }"""
+VISIBLE = "() => { scene.paint(); return scene.layers.filter(layer => layer.visible).length; }"
+# the colour of each building's roof, and of all else
+PAINTED = """() => {
+  const [{ tile }] = scene.layers, colours = scene.coloursOf(tile), seen = {};
+  tile.owner.forEach((row, t) => {
+    const shown = Array.from(colours.subarray(12 * t, 12 * t + 3), v => v / tile.light[t]);
+    (seen[row] ||= {})[tile.isRoof[t] ? "roof" : "other"] = shown;
+  });
+  return seen;
+}"""
 
 
 def parameters(*kinds):
@@ -99,172 +70,107 @@ def tiles(tmp_path_factory):
     return folder
 
 
-@pytest.fixture
-def serving():
-    """Serves what a server says in a thread; its address."""
-    servers = []
-
-    def start(server):
-        servers.append(server)
-        threading.Thread(target=server.serve_forever, daemon=True).start()
-        return server.server_address[1]
-
-    yield start
-    for server in servers:
-        server.shutdown()
-        server.server_close()
-
-
-def answer(port, path, host=None):
-    connection = http.client.HTTPConnection(LOOPBACK, port, timeout=20)
-    connection.request("GET", path, headers={"Host": host} if host else {})
-    response = connection.getresponse()
-    return response.status, response.read()
-
-
-def render_document(page, folder, serving, profile):
-    """The page over the tiles in `folder` after its scripts ran, as text."""
-    port = serving(LoopbackServer(partial(ViewHandler, directory=str(folder), page=page)))
-    command = [
-        BROWSER,
-        "--headless",
-        "--no-sandbox",
-        "--disable-gpu",
-        "--disable-background-networking",
-    ]
-    command += ["--enable-unsafe-swiftshader", "--no-proxy-server", f"--user-data-dir={profile}"]
-    command += [
-        "--window-size=900,700",
-        "--virtual-time-budget=60000",
-        "--dump-dom",
-        f"http://{LOOPBACK}:{port}/",
-    ]
-    return subprocess.run(command, capture_output=True, text=True, timeout=120).stdout
+@contextmanager
+def view(browser, tiles):
+    with (
+        pages.serve(make_server(tiles, "a <run>")) as server,
+        pages.open_page(browser, server.address) as page,
+    ):
+        yield page
 
 
 @needs_browser
-def test_the_page_shows_the_tiles_and_tells_of_a_building_clicked(tiles, serving, tmp_path):
-    page = render_page("a <run>").replace("</body>", ACT + "</body>")
-    text = render_document(page, tiles, serving, tmp_path / "profile")
-    answer = re.search(r'<pre id="said">(.*?)</pre>', text, re.DOTALL)
-    assert answer, f"the page's scripts did not run to their end: {text[-2000:]}"
-    say = json.loads(answer[1].replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&"))
-    assert say["faults"] == [] and say["webgl"] and say["tiles"] == 1
-    # of all parts, the most frequent first
-    assert say["legend"].split() == ["gable", "flat", "hip"]
-    assert re.search(r"id\s+house-1", say["clicked"]) and re.search(
-        r"rf_slope\s+36.87", say["clicked"]
-    )
-    assert (
-        re.search(r"part 0\s+gable: width 8.12", say["clicked"]) and "unknown" not in say["clicked"]
-    )
-    # a click beside the buildings changes nothing
-    assert say["kept"] == say["clicked"] and say["cleared"] == ""
-    assert say["away"] == 0 and say["home"] == 1
+def test_the_page_shows_the_tiles_and_tells_of_a_building_clicked(browser, tiles):
+    with view(browser, tiles) as page:
+        page.evaluate(pages.SETTLE)
+        assert page.evaluate("[Boolean(scene.gl), scene.layers.length]") == [True, 1]
+        # of all parts, the most frequent first
+        assert page.inner_text("#legend").split() == ["gable", "flat", "hip"]
+        x, y = page.evaluate(TOP)
+        page.click("#scene", position={"x": x, "y": y})
+        told = page.inner_text("#details")
+        for words in (r"id\s+house-1", r"rf_slope\s+36.87", r"part 0\s+gable: width 8.12"):
+            assert re.search(words, told)
+        assert "unknown" not in told
+        # a click beside the buildings changes nothing
+        height = page.evaluate("scene.canvas.clientHeight")
+        page.click("#scene", position={"x": 2, "y": height - 2})
+        assert page.inner_text("#details") == told
+        page.keyboard.press("Escape")
+        assert page.inner_text("#details") == ""
+        page.evaluate("() => { scene.target[0] += 1e6; }")
+        assert page.evaluate(VISIBLE) == 0
+        page.keyboard.press("Home")
+        assert page.evaluate(VISIBLE) == 1
 
 
-SUN = (
-    WAIT
-    + """<script>
-(async () => {
-  await ready; await settled();
-  const mode = document.getElementById("mode"), say = {}, [{ tile }] = scene.layers;
-  const choose = value => { mode.value = value; mode.dispatchEvent(new Event("change")); };
-  const painted = () => {
-    const colours = scene.coloursOf(tile), seen = {};
-    tile.owner.forEach((row, t) => {
-      const shown = Array.from(colours.subarray(12 * t, 12 * t + 3), v => v / tile.light[t]);
-      (seen[row] ||= {})[tile.isRoof[t] ? "roof" : "other"] = shown;
-    });
-    return seen;
-  };
-  say.hidden = document.getElementById("colour-by").hidden;
-  say.types = painted(); choose("sun"); say.sun = painted();
-  say.legend = document.getElementById("legend").innerText;
-  choose("type"); say.back = painted();
-  document.body.append(Object.assign(document.createElement("pre"),
-    { id: "said", textContent: JSON.stringify(say) }));
-})();
-</script>"""
-)
-
-
-def ask_page(models, script, serving, folder):
-    """What a script at the end of the page says of models."""
+def colour(browser, folder, values, mode):
+    """Show the sample with attributes: the legend, and the colours by type, by `mode` and by type
+    again.
+    """
+    models = [
+        ViewedModel(id, kind, solid, attributes, {0: kind})
+        for (id, (kind, solid)), attributes in zip(SOLIDS.items(), values, strict=True)
+    ]
     with pytest.warns(UserWarning, match="no CRS"):
-        write_models(folder / "a.3dtiles", models)
-    page = render_page("run").replace("</body>", script + "</body>")
-    text = render_document(page, folder / "a.3dtiles", serving, folder / "profile")
-    answer = re.search(r'<pre id="said">(.*?)</pre>', text, re.DOTALL)
-    assert answer, f"the page's scripts did not run to their end: {text[-2000:]}"
-    return json.loads(answer[1])
+        write_models(folder, models)
+    with view(browser, folder) as page:
+        page.evaluate(pages.SETTLE)
+        assert not page.evaluate("document.getElementById('colour-by').hidden")
+        colours = [page.evaluate(PAINTED)]
+        page.select_option("#mode", mode)
+        colours.append(page.evaluate(PAINTED))
+        legend = page.inner_text("#legend")
+        page.select_option("#mode", "type")
+        return legend, *colours, page.evaluate(PAINTED)
 
 
 @needs_browser
-def test_roofs_have_the_colours_of_the_sun_where_it_is_known(serving, tmp_path):
-    areas = {"hiproof_flat_roof_area_m2": 20.0, "hiproof_sloped_roof_area_m2": 60.0}
-    suns = [90.0 * 1000, None, 80.0 * 400]  # kWh, as a table has them
-    sky = {"hiproof_sun_sky": "clear sky"}
-    models = [
-        ViewedModel(id, kind, solid, {**areas, **sky, "hiproof_roof_sun_kwh": sun}, {0: kind})
-        for (id, (kind, solid)), sun in zip(SOLIDS.items(), suns, strict=False)
-    ]
-    say = ask_page(models, SUN, serving, tmp_path)
-    assert not say["hidden"] and say["back"] == say["types"] != say["sun"]
-    assert "from 800 kWh/m² (clear sky)" in say["legend"]
-    colours = [colour for least, colour in SUN_STOPS if least == 1100.0] + [UNKNOWN_COLOUR]
-    for row, colour in enumerate(colours[: len(models)]):
-        rgb = 255 * np.array(srgb(colour))
-        assert np.allclose(say["sun"][str(row)]["roof"], rgb, atol=2.0)
-        assert say["sun"][str(row)]["other"] == say["types"][str(row)]["other"]
-
-
-@needs_browser
-def test_roofs_have_the_colours_of_an_update_where_one_is_told(serving, tmp_path):
-    changes = [{"hiproof_change": "changed"}, {}, {"hiproof_change": "uncertain"}]
-    models = [
-        ViewedModel(id, kind, solid, told, {0: kind})
-        for (id, (kind, solid)), told in zip(SOLIDS.items(), changes, strict=False)
-    ]
-    say = ask_page(models, SUN.replace('"sun"', '"change"'), serving, tmp_path)
-    expected = [told.get("hiproof_change") for told in changes[: len(models)]]
-    named = {name for name in expected if name} | {"unchanged"}
-    assert set(say["legend"].split()) == named and say["back"] == say["types"]
+def test_roofs_have_the_colours_of_the_sun_where_it_is_known(browser, tmp_path):
+    known = {"hiproof_flat_roof_area_m2": 20.0, "hiproof_sloped_roof_area_m2": 60.0}
+    known["hiproof_sun_sky"] = "clear sky"
+    # kWh, as a table has them
+    values = [known | {"hiproof_roof_sun_kwh": sun} for sun in (90.0 * 1000, None)]
+    legend, types, suns, again = colour(browser, tmp_path / "a.3dtiles", values, "sun")
+    assert again == types != suns and "from 800 kWh/m² (clear sky)" in legend
+    expected = [colour for least, colour in SUN_STOPS if least == 1100.0] + [UNKNOWN_COLOUR]
     for row, name in enumerate(expected):
-        rgb = 255 * np.array(srgb(page_colours()["change"][name or "unchanged"]))
-        assert np.allclose(say["sun"][str(row)]["roof"], rgb, atol=2.0)
+        assert np.allclose(suns[str(row)]["roof"], 255 * np.array(srgb(name)), atol=2.0)
+        assert suns[str(row)]["other"] == types[str(row)]["other"]
 
 
 @needs_browser
-def test_tiles_that_cannot_be_read_are_said(tiles, serving, tmp_path):
-    shutil.copytree(tiles, tmp_path / "broken")
-    (tmp_path / "broken/tiles/r.glb").unlink()
-    page = render_page("run").replace("</body>", UNTIL_SETTLED + "</body>")
-    folder = tmp_path / "broken"
-    text = render_document(page, folder, serving, tmp_path / "first")
-    assert "Some tiles cannot be read (tiles/r.glb: 404)" in text
-    (folder / "tileset.json").unlink()
-    assert "is hiproof view still running" in render_document(
-        page, folder, serving, tmp_path / "second"
-    )
+def test_roofs_have_the_colours_of_an_update_where_one_is_told(browser, tmp_path):
+    values = [{"hiproof_change": "changed"}, {}]
+    legend, types, changes, again = colour(browser, tmp_path / "a.3dtiles", values, "change")
+    assert set(legend.split()) == {"changed", "unchanged"} and again == types
+    for row, name in enumerate(("changed", "unchanged")):
+        rgb = 255 * np.array(srgb(page_colours()["change"][name]))
+        assert np.allclose(changes[str(row)]["roof"], rgb, atol=2.0)
 
 
-def test_page_and_tiles_are_served(tiles, serving):
-    port = serving(make_server(tiles, "a <run>"))
-    status, page = answer(port, "/")
-    assert (
-        status == 200
-        and b"a &lt;run&gt;" in page
-        and b"http" not in page.replace(b"http://www.w3.org", b"")
-    )
-    assert json.loads(answer(port, "/tileset.json")[1])["asset"]["version"] == "1.1"
-    assert answer(port, "/tiles/r.glb")[1][:4] == b"glTF"
+@needs_browser
+def test_tiles_that_cannot_be_read_are_said(browser, tiles, tmp_path):
+    folder = shutil.copytree(tiles, tmp_path / "broken")
+    for file, message in (
+        ("tiles/r.glb", "Some tiles cannot be read (tiles/r.glb: 404)"),
+        ("tileset.json", "is hiproof view still running"),
+    ):
+        (folder / file).unlink()
+        with view(browser, folder) as page:
+            page.get_by_text(message).wait_for()
 
 
-def test_a_port_that_is_taken_is_told(tiles, serving):
-    port = serving(make_server(tiles, "run"))
-    with pytest.raises(InputError, match="leave --port out"):
-        make_server(tiles, "run", port)
+def test_page_and_tiles_are_served_at_a_port_of_their_own(tiles):
+    with pages.serve(make_server(tiles, "a <run>")) as server:
+        page, tileset, tile = (
+            urlopen(server.address + name, timeout=20).read()
+            for name in ("", "tileset.json", "tiles/r.glb")
+        )
+        with pytest.raises(InputError, match="leave --port out"):
+            make_server(tiles, "run", server.server_port)
+    assert b"a &lt;run&gt;" in page and b"http" not in page.replace(b"http://www.w3.org", b"")
+    assert json.loads(tileset)["asset"]["version"] == "1.1" and tile[:4] == b"glTF"
 
 
 def test_tiles_of_a_run_are_made_once_and_again_when_it_changed(tmp_path, capsys):
