@@ -51,9 +51,11 @@ def box(
     return prism([[(0, 0), (width, 0), (width, length), (0, length)]], z_bottom, z_top)
 
 
-def courtyard() -> Solid:
-    """A 10 m square block, 5 m high, around a 4 m square yard."""
-    return prism([[(0, 0), (10, 0), (10, 10), (0, 10)], [(3, 3), (3, 7), (7, 7), (7, 3)]], 0.0, 5.0)
+def courtyard(side: float = 10.0, yard: float = 4.0, height: float = 5.0) -> Solid:
+    """A square block around a square yard."""
+    a, b = (side - yard) / 2, (side + yard) / 2
+    outer = [(0, 0), (side, 0), (side, side), (0, side)]
+    return prism([outer, [(a, a), (a, b), (b, b), (b, a)]], 0.0, height)
 
 
 def gable_house(

@@ -4,51 +4,26 @@ without model.
 
 import json
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
-from hiproof.model import GROUND, ROOF, WALL, Face, Solid
+from handmade import courtyard, gable_house
+from hiproof.model import GROUND, ROOF, WALL, Solid
 from hiproof.write.meshes.viewed import ViewedModel
 
 ORIGIN = np.array([85000.0, 446000.0, 0.0])
 
 
-def gable_solid(width=8.0, length=12.0, eave=4.0, ridge=7.0):
-    """A gable whose ridge runs along y, standing on z = 0 at the origin."""
-    w, l = width, length
-    xyz = [(0, 0, 0), (w, 0, 0), (w, l, 0), (0, l, 0)]
-    xyz += [
-        (0, 0, eave),
-        (w, 0, eave),
-        (w, l, eave),
-        (0, l, eave),
-        (w / 2, 0, ridge),
-        (w / 2, l, ridge),
-    ]
-    roof = [(4, 8, 9, 7), (8, 5, 6, 9)]
-    walls = [(0, 1, 5, 8, 4), (1, 2, 6, 5), (2, 3, 7, 9, 6), (3, 0, 4, 7)]
-    faces = [Face((ring,), ROOF, 0) for ring in roof] + [Face((ring,), WALL) for ring in walls]
-    return Solid(np.array(xyz, float), (*faces, Face(((3, 2, 1, 0),), GROUND)))
-
-
-def courtyard_solid(side=20.0, yard=8.0, height=9.0):
-    """A flat-roofed block around a square courtyard."""
-    a, b = (side - yard) / 2, (side + yard) / 2
-    plan = [(0, 0), (side, 0), (side, side), (0, side), (a, a), (b, a), (b, b), (a, b)]
-    xyz = np.array([(x, y, z) for z in (0.0, height) for x, y in plan])
-    outer = [Face(((i, (i + 1) % 4, (i + 1) % 4 + 8, i + 8),), WALL) for i in range(4)]
-    inner = [Face(((i + 4, i + 12, (i + 1) % 4 + 12, (i + 1) % 4 + 4),), WALL) for i in range(4)]
-    roof = Face(((8, 9, 10, 11), (15, 14, 13, 12)), ROOF, 0)
-    return Solid(xyz, (roof, *outer, *inner, Face(((3, 2, 1, 0), (4, 5, 6, 7)), GROUND)))
+gable_solid = partial(gable_house, eave=4.0)
+courtyard_solid = partial(courtyard, side=20.0, yard=8.0, height=9.0)
 
 
 def two_parts(id="pair"):
     """A model whose roof faces belong to a gable and a hip."""
     solid = gable_solid()
-    faces = [
-        replace(face, part=index) if face.kind == ROOF else face
-        for index, face in enumerate(solid.faces)
-    ]
+    roofs = solid.select_faces(ROOF)
+    faces = [replace(f, part=roofs.index(f)) if f in roofs else f for f in solid.faces]
     return ViewedModel(
         id, "gable", Solid(solid.vertices + ORIGIN, tuple(faces)), {}, {0: "gable", 1: "hip"}
     )

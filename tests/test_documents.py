@@ -12,7 +12,7 @@ from hiproof.write.attribute_list import TABLES
 
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = [
-    *(ROOT / name for name in ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md"))
+    ROOT / f"{name}.md" for name in ("README", "ARCHITECTURE", "CONTRIBUTING", "CHANGELOG")
 ]
 DOCUMENTS += sorted((ROOT / "docs").rglob("*.md"))
 # by docs/generated.py and docs/demo_in_3d.py, when the site is built
@@ -117,43 +117,25 @@ def test_paths_exist(path):
 
 @every_document
 def test_commands_exist(path):
-    names = [
-        match for text in list_commands(path) for match in re.findall(r"^hiproof ([a-z]\w*)", text)
-    ]
-    assert [name for name in names if name not in COMMANDS] == []
-    modules = [
-        match for text in list_commands(path) for match in re.findall(r"^python -m ([\w.]+)", text)
-    ]
-    assert [
-        name
-        for name in modules
-        if name not in ("pytest", "venv", "pip") and find_module_file(name) is None
-    ] == []
+    def list_unknown(pattern, known):
+        found = [name for text in list_commands(path) for name in re.findall(pattern, text)]
+        return [name for name in found if not known(name)]
+
     targets = re.findall(r"^(\w[\w-]*):", (ROOT / "Makefile").read_text(), re.MULTILINE)
-    product = [
-        match for text in list_commands(path) for match in re.findall(r"^make ([\w-]+)", text)
-    ]
-    assert [name for name in product if name not in targets] == []
+    assert list_unknown(r"^hiproof ([a-z]\w*)", COMMANDS.__contains__) == []
+    assert list_unknown(r"^python -m (?!pytest|venv|pip)([\w.]+)", find_module_file) == []
+    assert list_unknown(r"^make ([\w-]+)", targets.__contains__) == []
 
 
 @every_document
 def test_options_exist(path):
-    missing = []
     for text in list_commands(path):
-        if text.startswith(OTHER_PROGRAMS) or text.startswith("python -m pytest"):
+        if text.startswith((*OTHER_PROGRAMS, "python -m pytest")):
             continue
         module = re.match(r"python -m ([\w.]+)", text)
-        options = (
-            OPTIONS
-            if module is None
-            else set(re.findall(r"--[\w-]+", find_module_file(module[1]).read_text()))
-        )
-        missing += [
-            option
-            for option in re.findall(r"(?<![\w-])--[a-z][\w-]*", text)
-            if option not in options
-        ]
-    assert missing == []
+        options = re.findall(r"--[\w-]+", find_module_file(module[1]).read_text()) if module else ()
+        used = set(re.findall(r"(?<![\w-])--[a-z][\w-]*", text))
+        assert used <= (set(options) if module else OPTIONS)
 
 
 @every_document

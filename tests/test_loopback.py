@@ -226,14 +226,6 @@ def test_silent_and_slow_connections_are_closed(page):
     assert code(send(port, request(port, start))) == 200
 
 
-def test_a_post_of_another_kind_changes_nothing(page):
-    port, start = page
-    answer = send(
-        port, request(port, start + "change", "POST", None, "Content-Length: 2", body=b"{}")
-    )
-    assert code(answer) in (405, 415)
-
-
 def test_a_client_that_goes_away_is_no_news(page):
     port, start = page
     for _ in range(5):

@@ -1,6 +1,7 @@
 """Buildings as objects of Python: one line each, meshes, data frames, runs read lazily."""
 
 import sys
+from contextlib import ExitStack
 from types import ModuleType
 
 import numpy as np
@@ -8,7 +9,13 @@ import pytest
 
 import hiproof
 from hiproof import progress
+from hiproof.cli.convert import convert
+from hiproof.cli.report import report
+from hiproof.cli.view import open_tiles
+from hiproof.enrich.run import enrich_run
 from hiproof.errors import InputError, NoModelError
+from hiproof.evaluate.models import run_models
+from hiproof.evaluate.run import evaluate_run
 from hiproof.formats import FORMATS
 from hiproof.status import Grade, Status
 from parametric_house import gable_house
@@ -103,9 +110,13 @@ def test_a_run_without_parameters_has_solids(run_of_each_kind, tmp_path):
     assert hiproof.open_run(run_of_each_kind).record["buildings"] == 4
 
 
-def test_a_folder_of_no_run_is_refused(tmp_path):
-    with pytest.raises(InputError, match="hiproof reconstruct"):
-        hiproof.open_run(tmp_path)
+@pytest.mark.parametrize(
+    "read", [hiproof.open_run, evaluate_run, report, run_models, convert, enrich_run, open_tiles]
+)
+def test_a_folder_of_no_run_is_refused(read, tmp_path):
+    with pytest.raises(InputError, match="`hiproof reconstruct`"), ExitStack() as opened:
+        result = read(tmp_path)
+        opened.enter_context(result)  # of what reads when it is entered
 
 
 def test_a_notebook_shows_bars(monkeypatch):

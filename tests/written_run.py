@@ -1,5 +1,6 @@
 """The files of a run written of given buildings, and built again of their parameters."""
 
+import json
 from contextlib import ExitStack
 from functools import cache
 from pathlib import Path
@@ -35,6 +36,14 @@ def require_schema(*name):
     """The schema that `open_schema` gives; without one the test is skipped."""
     schema = open_schema(*name)
     return pytest.skip(f"needs {name[0]} in ../shared/schemas") if schema is None else schema
+
+
+def require_json_schema(name):
+    """The validator of a schema of CityJSON 2.0; without one the test is skipped."""
+    path = SCHEMAS / "cityjson" / name
+    if not path.exists():
+        pytest.skip(f"needs {path}")
+    return pytest.importorskip("jsonschema").Draft7Validator(json.loads(path.read_text()))
 
 
 def write_run(folder, buildings, write, crs="EPSG:7415"):

@@ -11,7 +11,6 @@ import shapely
 from hiproof.compose import check_solid, compose
 from hiproof.compose.blocks import block, blocks
 from hiproof.compose.building_parts import LEAST_PART_M2, building_parts, join_parts
-from hiproof.frames import LocalFrame
 from hiproof.model import GROUND, ROOF, Face, Part, Piece, Roof, Solid
 from hiproof.simulate import COMPOUND_KINDS, random_compound
 from roof_zoo import FRAME, rectangle
@@ -141,4 +140,3 @@ def test_blocks_are_valid_and_as_large_as_their_outlines_and_heights(kind, seed)
 
 def test_blocks_that_do_not_touch_are_no_solid():
     assert blocks([shapely.box(0, 0, 1, 1), shapely.box(3, 0, 4, 1)], [2.0, 3.0], 0.0) is None
-    assert isinstance(FRAME, LocalFrame)

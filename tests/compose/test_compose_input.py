@@ -48,30 +48,33 @@ def test_piece_far_from_the_outline_still_roofs_it():
     assert compose(roof, 0.0).volume == pytest.approx(400.0)
 
 
-def test_bow_tie_outline_keeps_its_larger_half():
-    bow_tie = shapely.Polygon([(0, 0), (10, 4), (10, 0), (0, 6)])
-    _, solid = roof_zoo.flat_block(bow_tie, 5.0, 0.0)
-    assert check_solid(solid) == ()
+OUTLINES = {
+    "the larger half of a bow tie": ([(0, 0), (10, 4), (10, 0), (0, 6)], 90.0, 5),
+    "the larger side of a neck thinner than a millimetre": (
+        [(0, 0), (5, 0), (5, 2), (8, 2), (8, 0), (10, 0), (10, 5), (8, 5), (8, 2.0005), (5, 2.0005)]
+        + [(5, 5), (0, 5)],
+        125.0,
+        6,
+    ),
+    "a box of repeated and collinear vertices": (
+        [(0, 0), (0, 0), (5, 0), (5.0002, 0), (10, 0), (10, 8), (10, 8.0004), (0, 8)],
+        400.0,
+        6,
+    ),
+    "a box without its spike": (
+        [(0, 0), (10, 0), (10, 4), (15, 4.0003), (10, 4.0006), (10, 8), (0, 8)],
+        400.0,
+        6,
+    ),
+}
 
 
-def test_neck_thinner_than_a_millimetre_leaves_the_larger_side():
-    neck = shapely.union_all(
-        [shapely.box(0, 0, 5, 5), shapely.box(5, 2, 8, 2.0005), shapely.box(8, 0, 10, 5)]
-    )
-    _, solid = roof_zoo.flat_block(neck, 3.0, 0.0)
-    assert solid.volume == pytest.approx(75.0, abs=0.01)
-
-
-def test_repeated_and_collinear_outline_vertices_do_not_matter():
-    ring = [(0, 0), (0, 0), (5, 0), (5.0002, 0), (10, 0), (10, 8), (10, 8.0004), (0, 8)]
+@pytest.mark.parametrize("name", OUTLINES)
+def test_of_an_odd_outline_a_block_is_left(name):
+    ring, volume, faces = OUTLINES[name]
     _, solid = roof_zoo.flat_block(shapely.Polygon(ring), 5.0, 0.0)
-    assert len(solid.faces) == 6
-
-
-def test_spike_of_the_outline_vanishes():
-    spike = shapely.Polygon([(0, 0), (10, 0), (10, 4), (15, 4.0003), (10, 4.0006), (10, 8), (0, 8)])
-    _, solid = roof_zoo.flat_block(spike, 5.0, 0.0)
-    assert solid.volume == pytest.approx(400.0, abs=0.02)
+    assert check_solid(solid) == () and len(solid.faces) == faces
+    assert solid.volume == pytest.approx(volume, abs=0.02)
 
 
 def test_slivers_join_a_neighbour_by_the_settings():

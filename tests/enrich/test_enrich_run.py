@@ -135,11 +135,6 @@ def test_an_interrupted_second_call_leaves_the_files_of_the_first(run, monkeypat
     assert read_files(run / "enriched") == first
 
 
-def test_a_folder_without_a_run_is_refused(tmp_path):
-    with pytest.raises(InputError, match="expected the output folder of `hiproof reconstruct`"):
-        enrich_run(tmp_path)
-
-
 def test_a_run_is_not_overwritten(run):
     with pytest.raises(OutputError, match="which holds a run; choose another --out"):
         enrich_run(run, run)

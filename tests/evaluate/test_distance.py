@@ -46,21 +46,6 @@ def test_equals_the_slow_oracle(seed):
     np.testing.assert_allclose(point_surface_distances(points, polygons), expected, atol=1e-9)
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_moves_with_points_and_polygons(seed):
-    rng = np.random.default_rng(seed)
-    polygons = [random_polygon(rng) for _ in range(2)]
-    points = rng.normal(size=(30, 3)) * 4
-    q, _ = np.linalg.qr(rng.normal(size=(3, 3)))
-    shift = np.array([100.0, -50, 7])
-    moved = [[ring @ q.T + shift for ring in rings] for rings in polygons]
-    np.testing.assert_allclose(
-        point_surface_distances(points @ q.T + shift, moved),
-        point_surface_distances(points, polygons),
-        atol=1e-9,
-    )
-
-
 def test_a_hole_is_outside():
     outer = np.array([[0.0, 0, 0], [10, 0, 0], [10, 10, 0], [0, 10, 0]])
     hole = np.array([[4.0, 4, 0], [4, 6, 0], [6, 6, 0], [6, 4, 0]])

@@ -227,12 +227,6 @@ def test_the_clouds_are_the_runs_own_where_none_are_named(sample_run, tmp_path):
     ).read_text()
 
 
-def test_no_cloud_to_measure_against_is_refused(tmp_path):
-    write_sample_run(tmp_path)
-    with pytest.raises(HiproofError, match="expected point files to measure"):
-        evaluate(tmp_path)
-
-
 def test_buildings_of_which_no_place_is_known_have_no_points(sample_run, tmp_path):
     lines = (sample_run / "buildings.city.jsonl").read_text().splitlines(keepends=True)
     for name, kept_lines in (("none", []), ("bare", lines[-1:])):
@@ -243,18 +237,17 @@ def test_buildings_of_which_no_place_is_known_have_no_points(sample_run, tmp_pat
         assert [row["points"] for row in rows] == [0] * len(kept_lines)
 
 
-def test_a_folder_that_is_no_run_is_refused(tmp_path):
-    with pytest.raises(HiproofError, match="hiproof reconstruct"):
-        evaluate_run(tmp_path)
-
-
-def test_a_missing_cloud_is_refused(sample_run):
-    with pytest.raises(HiproofError, match="expected a point cloud"):
-        evaluate_run(sample_run, ["nowhere.laz"])
-
-
-def test_a_broken_run_record_is_refused(tmp_path):
+@pytest.mark.parametrize(
+    ("clouds", "record", "message"),
+    [
+        ([], None, "expected point files to measure"),
+        (["nowhere.laz"], None, "expected a point cloud"),
+        ([], "{", "record of a run"),
+    ],
+)
+def test_what_cannot_be_measured_is_refused(clouds, record, message, tmp_path):
     write_sample_run(tmp_path)
-    (tmp_path / "run.json").write_text("{")
-    with pytest.raises(HiproofError, match="record of a run"):
-        evaluate_run(tmp_path)
+    if record is not None:
+        (tmp_path / "run.json").write_text(record)
+    with pytest.raises(HiproofError, match=message):
+        evaluate(tmp_path, clouds)

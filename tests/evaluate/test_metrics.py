@@ -4,12 +4,14 @@ import json
 import math
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 import shapely
 
+from handmade import box
 from hiproof.city.folder.ledger import Ledger
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.evaluate.metrics import (
@@ -21,18 +23,12 @@ from hiproof.evaluate.metrics import (
     unexplained_area,
 )
 from hiproof.evaluate.run import evaluate_run
-from hiproof.model import GROUND, ROOF, WALL, Face, Solid
 
 SHARED = Path(__file__).parents[2] / "../shared"
 AMSTERDAM = SHARED / "data/amsterdam_west"
 
 
-def block(width=10.0, length=6.0, height=5.0):
-    """A flat-roofed box standing on z = 0 with its corner at the origin."""
-    x, y = [0, width, width, 0], [0, 0, length, length]
-    vertices = np.array([*zip(x, y, [0.0] * 4, strict=True), *zip(x, y, [height] * 4, strict=True)])
-    walls = tuple(Face(((i, (i + 1) % 4, (i + 1) % 4 + 4, i + 4),), WALL) for i in range(4))
-    return Solid(vertices, (Face(((4, 5, 6, 7),), ROOF, 0), *walls, Face(((3, 2, 1, 0),), GROUND)))
+block = partial(box, 10.0, 6.0, 0.0, 5.0)
 
 
 def roof_points(dz=0.0, step=0.5):

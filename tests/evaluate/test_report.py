@@ -10,9 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 from hiproof.cli.app import app, import_command
-from hiproof.cli.report import report
 from hiproof.cli.running import describe_overview
-from hiproof.errors import HiproofError
 from hiproof.evaluate.overview import BuildingOutcome, Overview
 from hiproof.evaluate.report import embed_json, report_html, worst_indices
 from hiproof.evaluate.report_data import report_data
@@ -149,11 +147,6 @@ def test_an_empty_run_makes_a_page(tmp_path):
     head = {"type": "CityJSON", "version": "2.0", "CityObjects": {}, "vertices": []}
     (tmp_path / "buildings.city.jsonl").write_text(json.dumps(head) + "\n")
     assert "0 buildings" in report_html(evaluate_run(tmp_path))
-
-
-def test_a_folder_that_is_no_run_is_refused(tmp_path):
-    with pytest.raises(HiproofError, match="hiproof reconstruct"):
-        report(tmp_path)
 
 
 def test_residual_colours_begin_at_their_stops():

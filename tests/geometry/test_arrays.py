@@ -76,10 +76,6 @@ def test_each_point_is_kept_once_in_its_order(points):
     assert np.array_equal(without_repeats(xyz), xyz[first])
 
 
-def test_a_thousand_equal_points_are_one():
-    assert len(without_repeats(np.full((1000, 3), 4.25))) == 1
-
-
 @pytest.mark.parametrize("spread", [3.0, 1e6], ids=["dense", "scattered"])
 @pytest.mark.parametrize("cell_m", [1.0, 2.5])
 def test_one_point_a_cell_equals_the_plain_loop(spread, cell_m):
@@ -124,10 +120,6 @@ def test_components_are_those_of_a_graph_search(links):
 def test_a_long_chain_in_any_order_is_one_component():
     chain = np.random.default_rng(0).permutation(5000)
     assert not label_components(5000, np.stack([chain[:-1], chain[1:]])).any()
-
-
-def test_nothing_has_no_components():
-    assert len(label_components(0, np.zeros((2, 0), np.int64))) == 0
 
 
 def some_footprints(seed, count=12):

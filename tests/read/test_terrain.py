@@ -116,16 +116,6 @@ def test_thinning_depends_neither_on_order_nor_on_tiles():
     assert np.allclose(np.sort(tiles, axis=0), np.sort(whole, axis=0), atol=1e-9)
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_thinning_equals_a_plain_loop_over_cells(seed):
-    points = np.round(np.random.default_rng(seed).uniform(-20, 20, (400, 3)), 4)
-    slow = []
-    for cell in np.unique(np.floor(points[:, [1, 0]] / 3.0), axis=0):
-        members = points[(np.floor(points[:, [1, 0]] / 3.0) == cell).all(axis=1)]
-        slow.append([*members[:, :2].mean(axis=0), np.sort(members[:, 2])[(len(members) - 1) // 2]])
-    assert np.allclose(thin_to_grid(points, 3.0), slow, atol=1e-9)
-
-
 class Around:
     """Ground known within 100 m of the model, a metre above its plane."""
 

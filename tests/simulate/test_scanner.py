@@ -9,8 +9,9 @@ import pytest
 import shapely
 from benchmarks.samples import training_sample
 
+from handmade import box
 from hiproof.errors import InputError
-from hiproof.model import Piece, Solid
+from hiproof.model import Piece
 from hiproof.simulate import (
     NOT_ROOF,
     ROOF_TYPES,
@@ -161,30 +162,14 @@ def test_defects_all_happen_and_none_happens_without_them():
     assert set(bare.source) <= {ROOF, WALL, GROUND}
 
 
-def cube(size=10.0, height=6.0):
-    """A block as a Solid, world coordinates far from the origin."""
-    from hiproof.model import GROUND, WALL, Face
-    from hiproof.model import ROOF as ROOF_SURFACE
-
-    base = np.array([(0, 0), (size, 0), (size, size), (0, size)])
-    vertices = np.concatenate([np.column_stack([base, np.full(4, z)]) for z in (0.0, height)]) + (
-        500.0,
-        900.0,
-        3.0,
-    )
-    sides = tuple(Face(((k, (k + 1) % 4, 4 + (k + 1) % 4, 4 + k),), WALL) for k in range(4))
-    return Solid(
-        vertices, (Face(((3, 2, 1, 0),), GROUND), *sides, Face(((4, 5, 6, 7),), ROOF_SURFACE))
-    )
-
-
 def test_solids_are_scanned_like_buildings():
-    cloud = scan_solids([cube()], np.random.default_rng(1), EXACT, ["flat"])
+    cube = box(10.0, 10.0, 0.0, 6.0).move(np.array([500.0, 900.0, 3.0]))
+    cloud = scan_solids([cube], np.random.default_rng(1), EXACT, ["flat"])
     roof = cloud.source == ROOF
     assert np.abs(cloud.points[roof, 2] - 9.0).max() < 1e-9 and set(cloud.label[roof]) == {0}
     assert np.abs(cloud.points[cloud.source == GROUND, 2] - 3.0).max() < 1e-9
     assert roof.sum() == pytest.approx(5.0 * 100.0, rel=0.12)
-    unknown = scan_solids([cube()], np.random.default_rng(1), EXACT, ["arch"])
+    unknown = scan_solids([cube], np.random.default_rng(1), EXACT, ["arch"])
     assert set(unknown.label) == {NOT_ROOF} and ROOF in unknown.source
 
 

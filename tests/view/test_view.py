@@ -18,7 +18,7 @@ from hiproof.cli.convert import convert
 from hiproof.cli.evaluate import evaluate
 from hiproof.cli.report import report
 from hiproof.cli.view import open_tiles
-from hiproof.errors import HiproofError, InputError, InputWarning, OutputError
+from hiproof.errors import InputError, InputWarning, OutputError
 from hiproof.view.server import make_server
 from hiproof.write import files
 from hiproof.write.colours import SUN_STOPS, UNKNOWN_COLOUR, page_colours, srgb
@@ -188,11 +188,6 @@ def test_tiles_of_a_run_are_made_once_and_again_when_it_changed(tmp_path, capsys
         assert (third / "tileset.json").stat().st_mtime_ns > time_made
     with open_tiles(folder) as first:
         assert first == folder
-
-
-def test_a_folder_of_neither_is_refused(tmp_path):
-    with pytest.raises(HiproofError, match="hiproof reconstruct"), open_tiles(tmp_path):
-        pass
 
 
 def refuse_writing_below(folder, monkeypatch):

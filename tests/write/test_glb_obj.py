@@ -5,7 +5,6 @@ import pytest
 
 from glb_files import accessor_values, parse_glb
 from hiproof.cli.app import import_command
-from hiproof.cli.convert import convert
 from hiproof.errors import HiproofError
 from hiproof.geometry.rings import ring_normal
 from hiproof.write.colours import linear_rgb, type_colour
@@ -125,11 +124,6 @@ def test_the_command_converts_a_run(tmp_path, format):
     write_sample_run(tmp_path)
     import_command("convert")([str(tmp_path), "--format", format], standalone_mode=False)
     assert (tmp_path / f"buildings.{format}").stat().st_size > 500
-
-
-def test_a_folder_without_models_is_refused(tmp_path):
-    with pytest.raises(HiproofError, match="hiproof reconstruct"):
-        convert(tmp_path)
 
 
 def test_a_place_that_cannot_be_written_is_refused(tmp_path):

@@ -3,7 +3,7 @@
 import json
 import re
 import sqlite3
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pyogrio
@@ -34,7 +34,7 @@ from hiproof.write.citygml.version2 import CODE_SPACES, NAMESPACES, CityGMLWrite
 from hiproof.write.citygml.version3 import CityGML3Writer
 from hiproof.write.colours import ROOF_COLOURS, list_legend, type_colour
 from hiproof.write.tables.styles import STYLES, TABLE
-from written_run import require_schema
+from written_run import list_faults
 
 ALL = ("0", "1.2", "1.3", "2.2")
 WHOLE = WriteSettings(lods=ALL)
@@ -90,17 +90,12 @@ def lods(city_object):
     return [geometry["lod"] for geometry in city_object.get("geometry", [])]
 
 
-@pytest.mark.parametrize(
-    "write", [WriteSettings(), WHOLE, IN_PARTS], ids=["default", "whole", "parts"]
-)
+@pytest.mark.parametrize("write", [WriteSettings(), WHOLE, IN_PARTS])
 def test_all_that_is_written_is_valid(tmp_path, write):
-    buildings = [terrace(), make_building(gable_house(), "house"), make_lost_building()]
-    gml(tmp_path, buildings, write)
-    for name in ("a.city.jsonl", "a.city.json"):
-        write_cityjson(tmp_path / name, buildings, "EPSG:7415", write=write)
-    for name in ("a.gml", "a.city.jsonl", "a.city.json"):
-        solids = list(read_solids(tmp_path / name))
-        assert len(solids) >= 2 and all(check_solid(solid, 0.01) == () for _, solid in solids)
+    assert list_faults(tmp_path, [terrace("a"), terrace("b")], asdict(write)) == []
+    write_cityjson(tmp_path / "a.city.json", [terrace()], "EPSG:7415", write=write)
+    ((_, solid), *_) = read_solids(tmp_path / "a.city.json")
+    assert check_solid(solid, 0.01) == ()
 
 
 @pytest.mark.parametrize(
@@ -110,12 +105,6 @@ def test_the_envelope_holds_a_footprint_that_was_moved(tmp_path, shift, lower, u
     root = gml(tmp_path, [replace(terrace(), shift=shift)], WHOLE)
     corners = [np.array(text.split(), float)[:2] for text in find(root, "//gml:Envelope/*/text()")]
     np.testing.assert_allclose(corners, RD_ORIGIN[:2] + np.array([lower, upper]))
-
-
-@pytest.mark.parametrize("write", [WHOLE, IN_PARTS], ids=["whole", "parts"])
-def test_citygml_stays_within_its_schema(tmp_path, write):
-    root = gml(tmp_path, [terrace(), make_lost_building()], write)
-    require_schema("citygml2").assertValid(root.getroottree())
 
 
 def test_levels_of_detail_have_the_heights_that_the_rule_says(tmp_path):

@@ -42,7 +42,11 @@ def town(count=60, seed=0):
     for k in range(count):
         position = ORIGIN + [*np.round(rng.uniform(0, 500, 2), 2), np.round(rng.uniform(0, 5), 2)]
         width = float(rng.uniform(4, 30))
-        solid = courtyard_solid(width, width / 3) if k % 5 == 0 else gable_solid(width, 1.5 * width)
+        solid = (
+            courtyard_solid(side=width, yard=width / 3)
+            if k % 5 == 0
+            else gable_solid(width, 1.5 * width)
+        )
         attributes = {
             "k": k,
             "half known": None if k % 2 else k / 2,

@@ -2,19 +2,17 @@
 measures models.
 """
 
-import importlib.util
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
 import shapely
 
 from handmade import RD_ORIGIN, box, courtyard, gable_house, make_building, make_lost_building
-from hiproof.model import GROUND, ROOF
+from hiproof.model import ROOF
 from hiproof.write.cityjson.features import write_cityjson
+from written_run import require_json_schema
 
-SHARED = Path(__file__).parents[3] / "shared"
 FOOTPRINT = shapely.Polygon([(85000, 446000), (85000, 446009), (85009, 446009), (85009, 446000)])
 
 
@@ -40,21 +38,13 @@ def document(tmp_path, buildings, crs="EPSG:7415", **options):
     return json.loads((tmp_path / "a.city.json").read_text("utf-8"))
 
 
-def validator(name):
-    path = SHARED / "schemas" / "cityjson" / name
-    if not path.exists():
-        pytest.skip(f"needs the CityJSON 2.0 schema at {path}")
-    jsonschema = pytest.importorskip("jsonschema")
-    return jsonschema.Draft7Validator(json.loads(path.read_text()))
-
-
 @pytest.mark.parametrize(
     "buildings", [street(), [], [make_lost_building()]], ids=["street", "none", "no model"]
 )
 @pytest.mark.parametrize("crs", ["EPSG:7415", None])
 def test_valid_by_the_schema(tmp_path, buildings, crs):
-    whole = validator("cityjson.min.schema.json")
-    feature = validator("cityjsonfeature.min.schema.json")
+    whole = require_json_schema("cityjson.min.schema.json")
+    feature = require_json_schema("cityjsonfeature.min.schema.json")
     head, *features = sequence(tmp_path, buildings, crs)
     assert len(features) == len(buildings)
     assert [error.message for item in features for error in feature.iter_errors(item)] == []
@@ -206,24 +196,3 @@ def test_an_added_building_leaves_the_others_as_they_were(tmp_path):
         [*street()[2:], make_building(box(), "far", origin=np.array([88123.0, 449000.0, 0.0]))],
     )
     assert new[1:-1] == old[1:]
-
-
-def test_a_measuring_tool_reads_it(tmp_path):
-    path = SHARED / "tools" / "roof_residuals.py"
-    if not path.exists():
-        pytest.skip(f"needs {path}")
-    spec = importlib.util.spec_from_file_location("roof_residuals", path)
-    tool = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(tool)
-    sequence(tmp_path, street())
-    roofs = list(tool.read_roofs(tmp_path / "a.city.jsonl"))
-    assert len(roofs) == sum(
-        len(b.solid.select_faces(ROOF)) for b in street() if b.built is not None
-    )
-    assert sum(polygon.area for polygon, *_ in roofs) == pytest.approx(96 + 84 + 20, rel=1e-6)
-
-
-def test_every_solid_has_its_ground(tmp_path):
-    for feature in sequence(tmp_path, street())[3:]:
-        (city_object,) = feature["CityObjects"].values()
-        assert GROUND in [s["type"] for s in find_solid(city_object)["semantics"]["surfaces"]]
