@@ -10,6 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+Box = tuple[float, float, float, float]  # xmin, ymin, xmax, ymax
+
 
 @dataclass(frozen=True)
 class Units:

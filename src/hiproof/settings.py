@@ -15,6 +15,7 @@ from typing import Any
 from .data_files import read_data_file
 from .errors import SettingsError
 
+Changes = dict[str, dict[str, Any]]  # of settings, by section and name
 LARGEST_INTEGER = 10**15  # no number of a setting without bounds is larger
 
 
@@ -184,7 +185,7 @@ class Settings:
     enrich: EnrichSettings = field(default_factory=EnrichSettings)
 
     @classmethod
-    def from_dict(cls, values: dict[str, dict[str, Any]]) -> Settings:
+    def from_dict(cls, values: Changes) -> Settings:
         """Return settings with sections replaced; SettingsError for unknown or bad values."""
         return cls().replace(values)
 
@@ -201,7 +202,7 @@ class Settings:
             ) from error
         return cls.from_dict(values)
 
-    def replace(self, values: dict[str, dict[str, Any]]) -> Settings:
+    def replace(self, values: Changes) -> Settings:
         """Return a copy with `values[section][name]` replaced, each checked."""
         sections: dict[str, Any] = {}
         for section_name, changes in values.items():
@@ -231,7 +232,7 @@ class Settings:
             sections[section_name] = dataclasses.replace(section, **checked)
         return dataclasses.replace(self, **sections)
 
-    def to_dict(self) -> dict[str, dict[str, Any]]:
+    def to_dict(self) -> Changes:
         """Return a plain nested dictionary, ready for JSON."""
         return {
             s.name: {

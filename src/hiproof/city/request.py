@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from ..frames import Box
 from ..masking import remember
 from ..settings import Settings
 
-Box = tuple[float, float, float, float]
 NO_MATTER = {"decides": "nothing"}
 WHICH = {"decides": "which buildings"}
 FILES_FIELD = {"names": "files"}

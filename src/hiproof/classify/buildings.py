@@ -9,10 +9,10 @@ import numpy as np
 import scipy
 
 from ..errors import InputError
+from ..frames import Box
 from ..geometry.point_grid import PointGrid
 from ..log import count_things
 from ..model import PointCloud
-from ..read.points.pointcloud import Box
 from .cells import SquareCells, plan_density
 from .ground import ground_grid
 from .surfaces import Surfaces, find_surfaces

@@ -12,10 +12,10 @@ import numpy as np
 import shapely
 
 from ..errors import ErrorReport, InputError, InputWarning, report_error
+from ..frames import Box
 from ..geometry.components import label_components
 from ..log import count_things
 from ..model import PointCloud
-from ..read.points.pointcloud import Box
 from ..settings import ReadSettings, Settings
 from .buildings import RoofSearch, find_squares, list_squares, select_roof_candidates
 from .cells import plan_density

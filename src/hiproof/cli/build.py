@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import click
 
 from ..log import count_things
 from ..progress import show_progress
+from ..settings import Changes
 
 
 def print_shapes() -> None:
@@ -25,7 +25,7 @@ def print_schema() -> None:
     click.echo(schema_text(), nl=False)
 
 
-def build(parameters: Path, *, out: Path, changes: dict[str, dict[str, Any]] | None = None) -> int:
+def build(parameters: Path, *, out: Path, changes: Changes | None = None) -> int:
     """Make all files of a run again from its parameters.jsonl.
 
     Change the file with any editor or program first: the new files follow it. Exit code: 0 all

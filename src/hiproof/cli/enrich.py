@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from ..log import Level, console_level, count_things
 from ..progress import show_progress
-from ..settings import EnrichSettings, Settings
+from ..settings import Changes, EnrichSettings, Settings
 
 if TYPE_CHECKING:
     from ..enrich.run import Enriched
@@ -22,7 +22,7 @@ def enrich(
     out: Path | None = None,
     terrain: str = "",
     jobs: int | None = None,
-    changes: dict[str, dict[str, Any]] | None = None,
+    changes: Changes | None = None,
 ) -> int:
     """Add party walls, areas, house types and the sun to the models of a run.
 

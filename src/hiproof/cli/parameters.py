@@ -19,7 +19,7 @@ from typing import Any, get_args, get_origin
 import click
 
 from ..data_files import read_data_file
-from ..settings import Settings, toml_value
+from ..settings import Changes, Settings, toml_value
 
 COMMANDS: dict[str, dict[str, Any]] = read_data_file("commands")
 SHARED_PARAMETERS = COMMANDS.pop("shared")
@@ -173,9 +173,9 @@ def make_setting_option(section: str, field: dataclasses.Field) -> click.Paramet
     )
 
 
-def collect_changes(params: Iterable[click.Parameter], values: dict[str, Any]) -> dict[str, Any]:
+def collect_changes(params: Iterable[click.Parameter], values: dict[str, Any]) -> Changes:
     """Take the settings that options give from `values`, by section and name."""
-    changes: dict[str, dict[str, Any]] = {}
+    changes: Changes = {}
     for param in params:
         section, field = getattr(param, "setting", None) or ("", None)
         value = values.pop(param.name or "") if field else None

@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import SettingsError
+from ..frames import Box
 from ..log import LOGGER, console_level, start
-from ..settings import EnrichSettings, Settings, format_value
+from ..settings import Changes, EnrichSettings, Settings, format_value
 from .enrich import enrich_folder, with_terrain
 
 SETTINGS_FILE = "hiproof.toml"
@@ -34,7 +35,7 @@ def reconstruct(
     restart: bool = False,
     enrich: bool = False,
     log_file: Path | None = None,
-    changes: dict[str, dict[str, Any]] | None = None,
+    changes: Changes | None = None,
 ) -> int:
     """Model the buildings of point clouds as CityGML, CityJSON, parameters and tables.
 
@@ -96,9 +97,7 @@ def reconstruct(
     return code
 
 
-def refuse_lone_options(
-    epoch: list[str] | None, enrich: bool, changes: dict[str, dict[str, Any]]
-) -> None:
+def refuse_lone_options(epoch: list[str] | None, enrich: bool, changes: Changes) -> None:
     """Raise SettingsError for options that mean something beside others alone."""
     if not enrich and "enrich" in changes:
         raise SettingsError("expected --enrich with options of `hiproof enrich`, got none; add it")
@@ -140,7 +139,7 @@ def find_settings_file(*inputs: str | None) -> Path | None:
     return result[0] if result else None
 
 
-def parse_box(text: str) -> tuple[float, float, float, float]:
+def parse_box(text: str) -> Box:
     """Parse the box that `--bbox` names.
 
     Raises SettingsError for anything else than four numbers in order.

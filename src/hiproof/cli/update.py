@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from ..log import Level, console_level, count_things
 from ..progress import show_progress
+from ..settings import Changes
 from .running import print_faults, print_files
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ def update(
     jobs: int | None = None,
     scheduler: str | None = None,
     restart: bool = False,
-    changes: dict[str, dict[str, Any]] | None = None,
+    changes: Changes | None = None,
 ) -> int:
     """Bring the models of a run up to date with a new survey, and list what changed.
 

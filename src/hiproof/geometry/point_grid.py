@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 import shapely
 
+from ..frames import Box
 from .grid import cell_range
 from .point_in_polygon import find_inside
 
@@ -40,7 +41,7 @@ class PointGrid:
         self.keys = keys[self.order]
 
     @property
-    def bounds(self) -> tuple[float, float, float, float]:
+    def bounds(self) -> Box:
         """The box (xmin, ymin, xmax, ymax) of all cells."""
         (x, y), cell_m = self.origin, self.cell_m
         return cell_m * x, cell_m * y, cell_m * (x + self.columns), cell_m * (y + self.rows)

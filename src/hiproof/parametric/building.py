@@ -35,6 +35,7 @@ from .record import (
     read_building,
     read_position,
     refuse_other_keys,
+    require_code,
     require_mapping,
 )
 
@@ -42,8 +43,7 @@ from .record import (
 def read_underside(record: Mapping[str, Any], building: Building, roof: Roof) -> Underside:
     """Read a solid's lower end in the frame of its `roof`; InputError for what makes none."""
     walls = record.get("walls", "level")
-    if walls not in ("level", "terrain"):
-        raise InputError(f"expected walls of level or terrain, got {excerpt(walls)}; choose one")
+    require_code(walls, ("level", "terrain"), "walls of level or terrain", "; choose one")
     lines = building.terrain_intersection if walls == "terrain" else ()
     return Underside(
         terrain=tuple(line - roof.frame.origin for line in lines),
@@ -70,10 +70,8 @@ def read_eaves(record: Mapping[str, Any], roof: Roof) -> Eaves | None:
     if record.get("overhangs") is None:
         return None
     kind = record.get("footprint_kind", WALLS)
-    if kind not in (WALLS, ROOF_EDGE):
-        raise InputError(
-            f"expected a footprint_kind of {WALLS} or {ROOF_EDGE}, got {excerpt(kind)}; choose one"
-        )
+    kinds = f"a footprint_kind of {WALLS} or {ROOF_EDGE}"
+    require_code(kind, (WALLS, ROOF_EDGE), kinds, "; choose one")
     thickness = number(record.get("roof_thickness", 0.2), "roof_thickness")
     if not 0.0 < thickness <= MOST_OVERHANG_M:
         raise InputError(
@@ -111,10 +109,8 @@ BOX_SIZES = ("length", "width", "height")
 def read_installation(record: Any, label: str) -> Installation:
     refuse_other_keys(record, "installation", label)
     kind = record.get("type")
-    if kind not in (CHIMNEY, ROOF_OBJECT):
-        raise InputError(
-            f"expected {CHIMNEY} or {ROOF_OBJECT} as the type of {label}, got {excerpt(kind)}"
-        )
+    kinds = f"{CHIMNEY} or {ROOF_OBJECT} as the type of {label}"
+    require_code(kind, (CHIMNEY, ROOF_OBJECT), kinds)
     sizes = numbers_by_name(record.get("parameters") or {}, f"the parameters of {label}")
     if sorted(sizes) != sorted(BOX_SIZES) or min(sizes.values()) <= 0:
         raise InputError(

@@ -19,7 +19,7 @@ from ..read.plausible import is_place
 from ..settings import Settings
 from ..write.head import FileHead
 from ..write.parameters import VERSION
-from .record import read_update
+from .record import read_update, require_code
 
 HEAD_KEY = "hiproof_parameters"
 # This very object stands for a line that cannot be read.
@@ -104,11 +104,8 @@ def read_head(record: Any, path: str | os.PathLike[str]) -> FileHead:
             f"{excerpt(record[HEAD_KEY])}; use the hiproof that wrote them, or reconstruct again"
         )
     unit, offset = record.get("unit", "auto"), record.get("cityjson_offset")
-    if not isinstance(unit, str) or unit not in NAMED_UNITS:
-        raise InputError(
-            f"expected a unit ({', '.join(NAMED_UNITS)}) in the head of {where}, got "
-            f"{excerpt(unit)}; choose one"
-        )
+    units = f"a unit ({', '.join(NAMED_UNITS)}) in the head of {where}"
+    require_code(unit, NAMED_UNITS, units, "; choose one")
     if offset is not None and not is_place(offset):
         raise InputError(
             f"expected three numbers as cityjson_offset of {where}, got {excerpt(offset)}; write "

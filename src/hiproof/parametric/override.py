@@ -44,7 +44,7 @@ from ..write.attribute_list import TABLES
 from ..write.parameters import building_record, outline_record
 from .building import build
 from .edit import rebuild
-from .record import number, numbers_by_name, place, polygon, require_mapping
+from .record import number, numbers_by_name, place, polygon, require_code, require_mapping
 from .refit import measure_building
 
 SHAPING = ("type", "types", "ridge_height", "eave_height", "fixed")
@@ -195,11 +195,8 @@ def read_types(record: Mapping[str, Any], where: str) -> tuple[str, ...]:
         )
     types = tuple(name.strip() if isinstance(name, str) else name for name in names or ())
     for name in (*types, record.get("type", "flat")):
-        if not isinstance(name, str) or name not in CATALOGUE:
-            raise InputError(
-                f"expected roof types ({', '.join(CATALOGUE)}) in {where}, got {excerpt(name)}; "
-                "choose among these"
-            )
+        known = f"roof types ({', '.join(CATALOGUE)}) in {where}"
+        require_code(name, CATALOGUE, known, "; choose among these")
     if types and record.get("type", types[0]) not in types:
         raise InputError(
             f"expected the type among the types in {where}, got {record['type']!r}; keep one of "

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from itertools import pairwise
 from typing import Any
 
@@ -57,11 +57,8 @@ def read_building(record: Mapping[str, Any]) -> tuple[Building, Roof | None]:
         figure(record, "z_ground") if roof is None else measure(record.get("z_ground"), "z_ground")
     )
     code, by_code = text_at(record, "quality"), {grade.code: grade for grade in Grade}
-    if code and code not in by_code:
-        raise InputError(
-            f"expected a quality ({', '.join(by_code)}), got {code!r:.40}; leave it as the run "
-            "wrote it"
-        )
+    if code:
+        require_code(code, by_code, f"a quality ({', '.join(by_code)})", AS_WRITTEN)
     building = Building(
         id=str(record["id"]),
         status=status,
@@ -88,11 +85,7 @@ def read_status(record: Mapping[str, Any], has_parts: bool) -> Status:
     """Read the status; a building with parts by hand has that of a model."""
     code = record.get("status", Status.MODELLED.code if has_parts else Status.NO_POINTS.code)
     by_code = {status.code: status for status in Status}
-    if not isinstance(code, str) or code not in by_code:
-        raise InputError(
-            f"expected a status ({', '.join(by_code)}), got {excerpt(code)}; leave it as the run "
-            "wrote it"
-        )
+    require_code(code, by_code, f"a status ({', '.join(by_code)})", AS_WRITTEN)
     if has_parts and not by_code[code].is_model:
         return Status.MODELLED
     if not has_parts and by_code[code].is_model:
@@ -247,11 +240,8 @@ def read_change(record: Mapping[str, Any]) -> dict[str, Any] | None:
         return None
     code = require_mapping(record["change"], "the change").get("class")
     codes = [change.code for change in Change]
-    if code not in codes:
-        raise InputError(
-            f"expected a class of change ({', '.join(codes)}), got {excerpt(code)}; leave it as "
-            "the update wrote it"
-        )
+    as_written = "; leave it as the update wrote it"
+    require_code(code, codes, f"a class of change ({', '.join(codes)})", as_written)
     change = require_values(record["change"], "change", "the change")
     lists = ("places", "lineage", "predecessors", "history")
     values = {**change, **{name: list_at(change, name) for name in lists}}
@@ -336,11 +326,9 @@ def refuse_other_kinds(record: Mapping[str, Any]) -> None:
     read_quality(record)
     for index, part in enumerate(parts):
         label = f"part {index}"
-        if text_at(part, "type") not in CATALOGUE:
-            raise InputError(
-                f"expected a roof type ({', '.join(CATALOGUE)}) in {label}, got "
-                f"{excerpt(part.get('type'))}"
-            )
+        require_code(
+            text_at(part, "type"), CATALOGUE, f"a roof type ({', '.join(CATALOGUE)}) in {label}"
+        )
         read_position(part, label)
         for name in ("parameters", "sigma"):
             numbers_by_name(part.get(name) or {}, f"{name} of {label}")
@@ -355,6 +343,15 @@ def refuse_other_keys(record: Any, table: str, label: str) -> None:
             f"expected the keys {', '.join(allowed)} of {label}, got also {', '.join(other[:8])}; "
             "remove them"
         )
+
+
+AS_WRITTEN = "; leave it as the run wrote it"
+
+
+def require_code(value: Any, codes: Collection[str], expected: str, advice: str = "") -> None:
+    """Raise InputError for what is none of the `codes`, which `expected` names."""
+    if not isinstance(value, str) or value not in codes:
+        raise InputError(f"expected {expected}, got {excerpt(value)}{advice}")
 
 
 def require_mapping(value: Any, label: str) -> Mapping[str, Any]:

@@ -23,7 +23,7 @@ from ..log import LOGGER
 from ..masking import mask, masked_values
 from ..model import Building
 from ..read.models.damage import finite
-from ..settings import Settings
+from ..settings import Changes, Settings
 from ..status import Status
 from ..write.cityjson.features import choose_offset
 from ..write.files import refuse_overwriting, save_text
@@ -81,7 +81,7 @@ def build_file(
     path: str | os.PathLike[str],
     out: str | os.PathLike[str],
     progress: Callable[[int], None] = lambda done: None,
-    changes: dict[str, dict[str, Any]] | None = None,
+    changes: Changes | None = None,
 ) -> Built:
     """Write a run's files into the folder `out` from a parameters.jsonl.
 

@@ -19,10 +19,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import InputError, OutputError
+from ..frames import Box
 from .relief import Relief
 from .roofs import SimBuilding, turn_points
 from .scanner import ScanSettings
-from .survey import Bounds, Flight, divide_into_patches, survey, write_footprints, write_laz
+from .survey import Flight, divide_into_patches, survey, write_footprints, write_laz
 from .town import TOWN, Lot, furnish_lot, street_side
 
 CITY_ORIGIN_XY = np.array([95000.0, 455000.0])
@@ -138,16 +139,16 @@ class Stock:
         is_near = (self.low < upper + SURROUNDINGS_M) & (self.high > lower - SURROUNDINGS_M)
         return np.flatnonzero(is_near.all(axis=1))
 
-    def near(self, bounds: Bounds) -> list[Lot]:
+    def near(self, bounds: Box) -> list[Lot]:
         """Return lots of the blocks that reach into `bounds`, with trees and shadows."""
         blocks = self.find_blocks(np.array(bounds[:2]), np.array(bounds[2:]))
         return [lot for block in blocks for lot in self.lots(int(block))]
 
-    def patches(self, bounds: Bounds) -> list[tuple[np.ndarray, np.ndarray]]:
+    def patches(self, bounds: Box) -> list[tuple[np.ndarray, np.ndarray]]:
         """Return the patches of `bounds` in or beside the city; the country is not surveyed."""
         return [patch for patch in divide_into_patches(bounds) if len(self.find_blocks(*patch))]
 
-    def tiles(self) -> Iterator[Bounds]:
+    def tiles(self) -> Iterator[Box]:
         """Yield squares of the city's tile size, on round coordinates, that touch a block."""
         size = self.city.tile_m
         first, last = np.floor(self.low.min(axis=0) / size), np.ceil(self.high.max(axis=0) / size)
@@ -203,7 +204,7 @@ def write_city(folder: Path, city: City) -> Iterator[Written]:
         yield Written(name, len(selected_lots), points)
 
 
-def holds(bounds: Bounds, lot: Lot) -> bool:
+def holds(bounds: Box, lot: Lot) -> bool:
     """Return whether a lot's building stands in a tile; one on the border, in one alone."""
     x, y, _ = lot.building.roof.frame.origin
     return bounds[0] <= x < bounds[2] and bounds[1] <= y < bounds[3]

@@ -10,6 +10,7 @@ import numpy as np
 import shapely
 
 from ..errors import InputError
+from ..frames import Box
 from ..geometry.rings import ring_normal
 from ..model import ROOF, Piece, Solid
 from .relief import Plane, Relief
@@ -106,7 +107,7 @@ def list_halfspaces(piece: Piece) -> np.ndarray:
     return np.concatenate([walls, roofs])
 
 
-def bound_body(body: Body) -> tuple[float, float, float, float]:
+def bound_body(body: Body) -> Box:
     """Return the disc (x, y, z, radius) that beams up to 45 degrees pass to hit the body."""
     corners = shapely.get_coordinates(body.piece.outline)
     smallest, largest = corners.min(axis=0), corners.max(axis=0)

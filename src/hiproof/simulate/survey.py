@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import OutputError
+from ..frames import Box
 from .flight import Swath, join_beams, make_beams
 from .relief import Relief
 from .roofs import turn_points
@@ -24,8 +25,6 @@ OUTLIER_SHARE = 2e-4  # of the points: birds and multipath
 # a date that does not change, so that the same seed gives the same bytes
 EPOCH = datetime.date(2020, 1, 1)
 CLASS_GROUND, CLASS_TREE, CLASS_BUILDING = 2, 5, 6  # classes of ASPRS
-
-Bounds = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True)
@@ -72,7 +71,7 @@ class Flight:
         return swaths
 
 
-def divide_into_patches(bounds: Bounds) -> list[tuple[np.ndarray, np.ndarray]]:
+def divide_into_patches(bounds: Box) -> list[tuple[np.ndarray, np.ndarray]]:
     """Return lowest and highest corners (2,) of patches of at most PATCH_M in `bounds`."""
     lower, upper = np.array(bounds[:2]), np.array(bounds[2:])
     columns, rows = np.ceil((upper - lower) / PATCH_M).astype(int)
@@ -166,7 +165,7 @@ def write_laz(path: Path, clouds: Iterator[Scan], origin: np.ndarray, scale_m: f
     return count
 
 
-def write_terrain(path: Path, bounds: Bounds, terrain: Relief, pixel_m: float = 1.0) -> None:
+def write_terrain(path: Path, bounds: Box, terrain: Relief, pixel_m: float = 1.0) -> None:
     """Write terrain heights at the pixel centres as a GeoTIFF."""
     from ..read.terrain.raster import import_rasterio
 

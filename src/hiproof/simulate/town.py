@@ -15,7 +15,7 @@ import numpy as np
 import shapely
 
 from ..data_files import read_data_file
-from ..frames import LocalFrame
+from ..frames import Box, LocalFrame
 from ..model import Roof
 from .compounds import COMPOUND_KINDS, random_compound
 from .relief import Relief
@@ -36,7 +36,7 @@ class Lot:
     crowns: np.ndarray
 
     @property
-    def bounds(self) -> tuple[float, float, float, float]:
+    def bounds(self) -> Box:
         """Plan bounds in the world, trees included."""
         lower, upper = np.array(self.building.footprint.bounds).reshape(2, 2)
         if len(self.crowns):

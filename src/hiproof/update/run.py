@@ -22,6 +22,7 @@ from ..formats import list_requested_files
 from ..garbage import collect_rarely
 from ..masking import mask
 from ..read.remote import locate
+from ..settings import Changes
 from ..status import Change
 from ..write.files import refuse_overwriting
 from ..write.head import FileHead, UpdateHead
@@ -56,7 +57,7 @@ class UpdateSummary:
 
 def update_area(
     request: UpdateRequest,
-    changes: dict[str, dict[str, Any]] | None = None,
+    changes: Changes | None = None,
     progress: Progress = lambda *_: None,
 ) -> UpdateSummary:
     """Bring the models of `request.run` up to date in `request.out`.

@@ -12,12 +12,12 @@ import numpy as np
 import shapely
 
 from ...errors import InputError, InputWarning
-from ...frames import Units
+from ...frames import Box, Units
 from ...log import count_things
 from ...model import PointCloud
 from ...read.points.pointcloud import PointFileHeader, iter_points, read_points
 from ...settings import Settings
-from ..request import Box, Request
+from ..request import Request
 from .classes import choose_classes
 from .work_plan import Job
 

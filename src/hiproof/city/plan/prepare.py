@@ -11,7 +11,7 @@ import shapely
 
 from ...errors import InputError, InputWarning
 from ...fit.registration import Registration
-from ...frames import Units
+from ...frames import Box, Units
 from ...masking import mask
 from ...model import Footprint
 from ...read.crs import horizontal_crs, names_place, same_horizontal
@@ -26,7 +26,7 @@ from ...settings import Settings
 from ...write.naming import FileUnits
 from ...write.reprojected import choose_file_crs
 from ...write.tables.geopackage import attributes_with_a_column
-from ..request import Box, Request
+from ..request import Request
 from .checks import refuse_missing_use
 from .classes import settle_classes
 from .frame import AreaFrame, plan_bounds, settle_frame

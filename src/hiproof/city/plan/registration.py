@@ -25,7 +25,7 @@ from ...fit.registration import (
     Registration,
     register,
 )
-from ...frames import Units
+from ...frames import Box, Units
 from ...geometry.grid import number_cells
 from ...masking import mask
 from ...model import Footprint, PointCloud
@@ -207,13 +207,13 @@ def hash_cell(cell: Cell) -> bytes:
     return hashlib.blake2b(f"{cell[0]} {cell[1]}".encode(), digest_size=8).digest()
 
 
-def expand_cell(cell: Cell, around_m: float = 0.0) -> tuple[float, float, float, float]:
+def expand_cell(cell: Cell, around_m: float = 0.0) -> Box:
     """Return the square of a cell with a margin: (xmin, ymin, xmax, ymax)."""
     x, y = SAMPLE_CELL_M * cell[0], SAMPLE_CELL_M * cell[1]
     return x - around_m, y - around_m, x + SAMPLE_CELL_M + around_m, y + SAMPLE_CELL_M + around_m
 
 
-def meets(boxes: np.ndarray, box: tuple[float, float, float, float]) -> np.ndarray:
+def meets(boxes: np.ndarray, box: Box) -> np.ndarray:
     """Return which of `boxes` (n, 4) meet `box`."""
     return np.all(boxes[:, :2] <= box[2:], axis=1) & np.all(boxes[:, 2:] >= box[:2], axis=1)
 

@@ -23,7 +23,7 @@ import shapely
 from ...errors import InputError
 from ...extras import import_extra
 from ...masking import mask, remember
-from .polygons import as_polygons, decode_geometry
+from .polygons import Features, as_polygons, decode_geometry
 
 TIMEOUT_S = 10  # to reach a server; libpq would wait for minutes
 SCHEMES = ("postgresql", "postgres")
@@ -36,9 +36,7 @@ def is_database(source: Any) -> bool:
     return isinstance(source, str) and source.partition(":")[0].lower() in SCHEMES
 
 
-def read_table(
-    source: str, where: str | None = None
-) -> tuple[dict[str, Any], np.ndarray, np.ndarray, list[np.ndarray]]:
+def read_table(source: str, where: str | None = None) -> Features:
     """Read the table that a source names, in the shape that pyogrio gives.
 
     That is metadata (fields, crs), row numbers, geometries and columns. `where` is a condition

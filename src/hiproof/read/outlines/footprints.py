@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import shapely
 from pyproj import CRS
 
 from ...errors import InputError, warn
-from ...frames import Units
+from ...frames import Box, Units
 from ...geometry.rings import clockwise
 from ...log import count_things
 from ...masking import remember
@@ -33,17 +33,13 @@ from ..names import READING
 from ..remote import is_url
 from .database import is_database, read_table, table_crs
 from .geoparquet import is_parquet
-from .polygons import is_surface, simple_polygons
-
-if TYPE_CHECKING:
-    from .vector_file import Features
+from .polygons import Features, is_surface, simple_polygons
 
 # What GDAL calls the CRSs -1, 0 and 99999 of a GeoPackage, which has to name one.
 UNDEFINED_CRS = ("Undefined Cartesian SRS", "Undefined geographic SRS", "Undefined SRS")
 
 SAME_M = 0.01  # m, within which two outlines are the same: footprints are drawn in centimetres
 
-Box = tuple[float, float, float, float]
 ID_NAMES: list[str] = READING["id_names"]
 
 

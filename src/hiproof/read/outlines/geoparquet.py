@@ -29,7 +29,7 @@ from ...extras import import_extra
 from ..crs import read_named_crs
 from ..remote import is_url, open_binary
 from .attribute_columns import shortest
-from .polygons import decode_geometries
+from .polygons import Features, decode_geometries
 
 # Columns of the table that answers a condition, of names that no file has.
 ROW, FID = "hiproof_row", "hiproof_fid"
@@ -46,7 +46,7 @@ def read_parquet(
     layer: str | int | None,
     where: str | None,
     box_in: Callable[[CRS | None], tuple[float, ...] | None],
-) -> tuple[dict[str, Any], np.ndarray, np.ndarray, list[np.ndarray]]:
+) -> Features:
     """Read metadata, row numbers, geometries and columns of a file.
 
     Metadata are fields, crs and total_bounds. `box_in` gives the box that rows have to meet, in the

@@ -6,12 +6,16 @@ Surfaces in WKB that GEOS does not know become collections of polygons.
 from __future__ import annotations
 
 import struct
+from typing import Any
 
 import numpy as np
 import shapely
 
 from ...geometry.rings import repair_polygons
 from ..plausible import is_plausible
+
+# Metadata (fields and crs), feature numbers, geometries and columns of a layer.
+Features = tuple[dict[str, Any], np.ndarray, np.ndarray, list[np.ndarray]]
 
 # of a repaired footprint's area; smaller fragments are artefacts of the self-intersection
 SLIVER_SHARE = 0.01

@@ -17,8 +17,9 @@ from pyogrio.errors import DataLayerError, DataSourceError, FeatureError, FieldE
 from pyogrio.util import vsi_path
 
 from ...errors import InputError, warn
+from ...frames import Box
 from .attribute_columns import make_known_condition, restore_declared_types
-from .polygons import decode_geometries
+from .polygons import Features, decode_geometries
 
 SLASHED_DATE = re.compile(r"^(\d{1,5})/(\d\d)/(\d\d)")  # how GDAL writes a date as text
 
@@ -148,15 +149,11 @@ def virtual_layer(path: str, layer: str, geometry: str = "", text: str = "") -> 
     return ElementTree.tostring(root, encoding="unicode")
 
 
-# Metadata (fields and crs), feature numbers, geometries and columns of a layer.
-Features = tuple[dict[str, Any], np.ndarray, np.ndarray, list[np.ndarray]]
-
-
 def read_vector_file(
     path: str | Path,
     layer: str | int | None,
     where: str | None,
-    make_box: Callable[[Any], tuple[float, float, float, float] | None],
+    make_box: Callable[[Any], Box | None],
 ) -> Features:
     """Read pyogrio's metadata, feature numbers, geometries and columns.
 

@@ -21,13 +21,12 @@ import numpy as np
 from laspy import DecompressionSelection, LazBackend
 
 from ...errors import InputError, warn
+from ...frames import Box
 from ...log import count_things
 from ..plausible import Implausible
 from ..remote import is_url, open_binary
 from .las_header import LasFacts, Octree, check_all_points, check_points, read_facts
 from .runs import compute_run_boxes
-
-Box = tuple[float, float, float, float]
 
 
 def copc_points(
@@ -170,7 +169,7 @@ def facts_at(path: str, changed: int | None) -> LasFacts:
 def las_chunks(
     path: str | Path,
     chunk_points: int,
-    box: tuple[float, float, float, float] | None = None,
+    box: Box | None = None,
     runs: np.ndarray | None = None,
     noted: list[np.ndarray] | None = None,
 ) -> Iterator[Chunk]:
@@ -206,7 +205,7 @@ def is_copc(path: str | Path) -> bool:
     return head[375 + 2 : 375 + 6] == b"copc"
 
 
-def copc_chunk(path: str | Path, box: tuple[float, float, float, float]) -> Chunk:
+def copc_chunk(path: str | Path, box: Box) -> Chunk:
     facts = read_checked_facts(path)
     with translate_errors(path), open_binary(path) as file:
         if facts.octree is None:

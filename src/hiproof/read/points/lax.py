@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import warn
+from ...frames import Box
 from ..remote import is_url
 from .las import read_checked_facts
 from .runs import RunIndex
@@ -68,7 +69,7 @@ def parse_index(words: np.ndarray) -> tuple[RunIndex, int]:
     return RunIndex(np.array(boxes), np.concatenate(cell_of), np.concatenate(runs)), indexed_points
 
 
-def cell_box(index: int, root: tuple[np.float32, ...]) -> tuple[float, float, float, float]:
+def cell_box(index: int, root: tuple[np.float32, ...]) -> Box:
     """Return a cell's box, halved in float32 as the writer does, and that much wider."""
     level = 0
     while index >= 4**level:

@@ -12,7 +12,7 @@ from urllib.parse import urlsplit
 import numpy as np
 
 from ...errors import InputError, warn
-from ...frames import METRES, Units
+from ...frames import METRES, Box, Units
 from ...log import count_things
 from ...model import PointCloud
 from ...settings import Settings
@@ -79,8 +79,6 @@ COARSE_STEP_M = (
 # that text rounds to, or 32 bits at a national grid's coordinates
 STEPS = (1.0, 0.5, 0.25, 0.2, 0.125, 0.1, 0.0625)
 STEP_POINTS = (100, 10_000)  # fewer say nothing of steps, more nothing new
-
-Box = tuple[float, float, float, float]  # xmin, ymin, xmax, ymax in world metres, inclusive
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from pyproj import CRS
 
 from ...errors import DamagedRaster, InputError, warn
 from ...extras import import_extra
-from ...frames import Units
+from ...frames import Box, Units
 from ...geometry.grid import number_cells
 from ...masking import mask, remember
 from ..crs import (
@@ -145,7 +145,7 @@ class RasterTerrain:
         return units.height
 
     @property
-    def bounds(self) -> tuple[float, float, float, float]:
+    def bounds(self) -> Box:
         """Extent (xmin, ymin, xmax, ymax) in the raster's own CRS."""
         return tuple(self.dataset.bounds)
 
