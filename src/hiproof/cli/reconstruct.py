@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import SettingsError
-from ..frames import Box
 from ..log import LOGGER, console_level, start
 from ..settings import Changes, EnrichSettings, Settings, format_value
 from .enrich import enrich_folder, with_terrain
@@ -139,7 +138,7 @@ def find_settings_file(*inputs: str | None) -> Path | None:
     return result[0] if result else None
 
 
-def parse_box(text: str) -> Box:
+def parse_box(text: str) -> tuple[float, float, float, float]:
     """Parse the box that `--bbox` names.
 
     Raises SettingsError for anything else than four numbers in order.
