@@ -7,7 +7,7 @@ import numpy as np
 from ...compiled import compiled
 from ..union.objective import compute_point_cost
 from .price import compute_costs, list_points, widen
-from .tables import N_SIDES, VOLUME_COUNT, add_line, place_volume, read_line
+from .tables import N_SIDES, VOLUME_COUNT, add_line, find_lowest_plane, place_volume, read_line
 
 MOST_COPIED_M = 8.0  # Size (m) of the largest volume that is copied.
 REACH_M = 20.0  # Farthest (m) that it is.
@@ -51,14 +51,12 @@ def measure_gain(roof, site, k, x, y, points, costs):
     gain = 0.0
     for m in range(len(points)):
         i = points[m]
-        u, v, height, is_inside = site.x[i] - x, site.y[i] - y, np.inf, True
+        u, v, is_inside = site.x[i] - x, site.y[i] - y, True
         for s in range(N_SIDES):
             half = roof.half_planes[k, s]
             is_inside &= half[0] * u + half[1] * v + half[2] >= 0.0
-        for p in range(roof.n_planes[k] if is_inside else 0):
-            row = roof.planes[k, p]
-            height = min(height, row[0] * u + row[1] * v + row[2])
         if is_inside:
+            height, _ = find_lowest_plane(roof, k, u, v)
             gain += costs[m] - compute_point_cost(site.z[i], height, site.dead, site.width)
     return gain
 

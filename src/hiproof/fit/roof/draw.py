@@ -13,7 +13,15 @@ from collections import namedtuple
 import numpy as np
 
 from ...compiled import compiled
-from .tables import FAR_M, N_SIDES, ONE_PLANE, VOLUME_COUNT, VOLUME_PLANES, Tables
+from .tables import (
+    FAR_M,
+    N_SIDES,
+    ONE_PLANE,
+    VOLUME_COUNT,
+    VOLUME_PLANES,
+    Tables,
+    find_lowest_plane,
+)
 
 RING_CORNERS = 40  # Most corners of a fragment.
 MOST_FRAGMENTS = 4000  # Most fragments of what is drawn at once.
@@ -443,7 +451,7 @@ def compute_height(roof, view, x, y, reach):
     Sides reach so far (m) beyond themselves.
     """
     height, volume, plane = -np.inf, -1, -1
-    boxes, halves, rows = roof.boxes, roof.half_planes, roof.planes
+    boxes, halves = roof.boxes, roof.half_planes
     for m in range(len(view)):
         k = view[m]
         if x < boxes[k, 0] - reach or x > boxes[k, 1] + reach:
@@ -455,11 +463,7 @@ def compute_height(roof, view, x, y, reach):
             is_inside &= halves[k, s, 0] * x + halves[k, s, 1] * y + halves[k, s, 2] >= -reach
         if not is_inside:
             continue
-        lowest, lowest_plane = np.inf, -1
-        for p in range(roof.n_planes[k]):
-            z = rows[k, p, 0] * x + rows[k, p, 1] * y + rows[k, p, 2]
-            if z < lowest:
-                lowest, lowest_plane = z, p
+        lowest, lowest_plane = find_lowest_plane(roof, k, x, y)
         if roof.replaces[k] or lowest > height:
             height, volume, plane = lowest, k, lowest_plane
     return height, volume, plane

@@ -7,6 +7,7 @@ import numpy as np
 from ...compiled import compiled
 from ..prices import LOW_STEP_UNITS, NARROW_M, NARROW_UNITS
 from .draw import ONE_PLACE_M, SEEN_STEP_M, compute_heights
+from .tables import find_lowest_plane
 
 LOW_STEP_TOP_M = 0.5  # Steps lower than this (m) cost by the metre.
 STEP_SAMPLE_M = 0.5  # Distance (m) of the places in which the height of a step is measured.
@@ -50,10 +51,8 @@ def count_narrow_sides(roof, view, site, edges, below):
         heights = np.empty(n)
         compute_heights(roof, view, x, y, 0.0, heights, np.empty(n, np.int64))
         for i in range(n):
-            k, own = below[i] if reach > 0.0 else int(edges[i, 6]), np.inf
-            for p in range(roof.n_planes[k]):
-                row = roof.planes[k, p]
-                own = min(own, row[0] * x[i] + row[1] * y[i] + row[2])
+            k = below[i] if reach > 0.0 else int(edges[i, 6])
+            own, _ = find_lowest_plane(roof, k, x[i], y[i])
             goes_on = own - SEEN_STEP_M <= heights[i] <= own + LOW_STEP_TOP_M
             is_narrow = not (goes_on and is_inside(site, x[i], y[i]))
             counts[i] += is_narrow and not lies_on_wall(site, edges[i])

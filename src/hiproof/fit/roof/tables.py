@@ -179,6 +179,17 @@ def place_planes(roof, k):
 
 
 @compiled
+def find_lowest_plane(roof, k, x, y):
+    """Return the height of volume k at a place, whatever its sides, and the plane that has it."""
+    lowest, plane = np.inf, -1
+    for p in range(roof.n_planes[k]):
+        z = roof.planes[k, p, 0] * x + roof.planes[k, p, 1] * y + roof.planes[k, p, 2]
+        if z < lowest:
+            lowest, plane = z, p
+    return lowest, plane
+
+
+@compiled
 def place_volume(roof, k):
     """Compute the planes, the half planes and the box of volume k from the tables."""
     for s in range(N_SIDES):
