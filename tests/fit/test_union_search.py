@@ -16,7 +16,7 @@ from hiproof.fit.union.candidates import (
     find_best_rectangles,
     list_candidates,
 )
-from hiproof.fit.union.edges import MIN_SIDE_M, move_edges
+from hiproof.fit.union.edges import move_edges
 from hiproof.fit.union.grow import prepare_growth
 from hiproof.fit.union.improve import digest_surroundings, improve
 from hiproof.fit.union.moves import (
@@ -46,7 +46,6 @@ from hiproof.fit.union.prices import (
 from hiproof.fit.union.refit import refit
 from hiproof.fit.union.scene import list_nodes
 from hiproof.fit.union.trim import (
-    NEAR_EDGE_M,
     NEAR_VERTEX_M,
     draw_in,
     draw_out,
@@ -315,7 +314,7 @@ def test_moved_edges_leave_a_rectangle(seed):
         move_edges(volumes, scene, k, value, 60.0, context)
         for lower in (U0, U0 + 2):
             moved = (volumes[k, lower : lower + 2] != original[lower : lower + 2]).any()
-            assert not moved or volumes[k, lower + 1] - volumes[k, lower] >= MIN_SIDE_M - 1e-9
+            assert not moved or volumes[k, lower + 1] > volumes[k, lower]
 
 
 MOVES = {
@@ -335,7 +334,7 @@ def test_a_move_gives_the_true_objective_and_never_a_higher_one(move, seed):
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_a_hidden_edge_is_drawn_in_for_next_to_nothing_or_where_no_height_changes(seed):
+def test_a_hidden_edge_is_drawn_in_where_no_height_changes(seed):
     rng, volumes, scene = draw_case(seed)
     value, (U, V) = compute_objective(volumes, scene), list_nodes(scene)
     for k in range(1, len(volumes)):
@@ -345,11 +344,10 @@ def test_a_hidden_edge_is_drawn_in_for_next_to_nothing_or_where_no_height_change
             )
             trial, result = draw_in(volumes, scene, value, k, edge, seen_to, U, V)
             assert is_true(trial, scene, result)
-            twin = (
-                compute_roof_heights(trial, U, V, UNSORTED)[0]
-                == compute_roof_heights(volumes, U, V, UNSORTED)[0]
-            ).all()
-            assert twin or result <= value + SLACK_UNITS * scene.evidence + 1e-6
+            heights, before = (
+                compute_roof_heights(rows, U, V, UNSORTED)[0] for rows in (trial, volumes)
+            )
+            assert np.array_equal(heights, before)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -388,8 +386,8 @@ def test_trimming_gives_the_true_objective_and_no_volume_reaches_further_than_be
     planes = {tuple(row[OFFSET0 : OFFSET0 + N_PLANES]): row for row in volumes}
     for row in trimmed:
         original = planes[tuple(row[OFFSET0 : OFFSET0 + N_PLANES])]
-        assert (row[[U0, U0 + 2]] >= original[[U0, U0 + 2]] - NEAR_EDGE_M).all()
-        assert (row[[U0 + 1, V1]] <= original[[U0 + 1, V1]] + NEAR_EDGE_M).all()
+        assert (row[[U0, U0 + 2]] >= original[[U0, U0 + 2]] - NEAR_VERTEX_M).all()
+        assert (row[[U0 + 1, V1]] <= original[[U0 + 1, V1]] + NEAR_VERTEX_M).all()
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -9,7 +9,7 @@ import numpy as np
 from ...compiled import compiled
 from .around import measure_context
 from .candidates import SAME_SLOPE, find_best_rectangles
-from .edges import EVERYWHERE, MIN_SIDE_M, NO_GAIN, move_edges
+from .edges import EVERYWHERE, NO_GAIN, move_edges
 from .improve import improve
 from .objective import compute_costs, compute_objective_with
 from .prices import (
@@ -175,10 +175,7 @@ def cut_back_neighbours(volumes, extended, scene, best, lowest, value, surcharge
             start, end = extended[j, U0 + (edge & 2)], extended[j, U1 + (edge & 2)]
             stop = extended[last, U0 + (edge ^ 1)]
             overhang = stop - start if edge % 2 == 0 else end - stop
-            if (
-                CUT_LEAST_M < overhang < CUT_MOST_SHARE * (end - start)
-                and end - start - overhang >= MIN_SIDE_M
-            ):
+            if CUT_LEAST_M < overhang < CUT_MOST_SHARE * (end - start):
                 cut = extended.copy()
                 cut[j, U0 + edge] = stop
                 context = measure_context(cut, scene.U, scene.V, scene.order, last)

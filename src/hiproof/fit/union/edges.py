@@ -24,7 +24,6 @@ from .volumes import (
     price_volume,
 )
 
-MIN_SIDE_M = 0.8  # A narrower volume (m) is no part of a roof but a gutter or a parapet.
 BEYOND_OUTLINE_M = 0.6  # An edge so far (m) outside the outline is not visible.
 VERTEX_REACH_M = 1.5  # Corners of the outline within this distance (m) are places for an edge.
 SMALL_STEPS = 4  # Steps tried to either side of an edge.
@@ -68,7 +67,7 @@ def move_edges(volumes, scene, k, value, reach, context):
         best, best_place = value - NO_GAIN, start
         for q in range(m):
             t = places[q]
-            if abs(t - start) > reach or sign * (t - opposite) < MIN_SIDE_M:
+            if abs(t - start) > reach or sign * (t - opposite) <= 0.0:
                 continue
             p = find_place(distance, sign * t)
             while p < len(distance) and distance[p] == sign * t:

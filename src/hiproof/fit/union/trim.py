@@ -24,7 +24,6 @@ from .volumes import (
 
 HIDDEN_M = 0.35  # Edges that are hidden by more (m) are drawn in.
 COVER_M = 0.25  # They are drawn in to this distance (m) beyond what is visible.
-NEAR_EDGE_M = 0.5  # An edge within this distance (m) of what is visible is the place for a side.
 NEAR_VERTEX_M = 0.3  # A corner within this distance (m) of what is visible is the place for a side.
 # The outward direction of the low and the high edge along an axis.
 OUTWARDS = np.array([-1.0, 1.0])
@@ -86,27 +85,19 @@ def draw_in(
     U: np.ndarray,
     V: np.ndarray,
 ) -> tuple[np.ndarray, float]:
-    """Draw edge `edge` (a column) of volume k in to a line near `seen_to`.
+    """Draw edge `edge` (a column) of volume k in to just beyond `seen_to`.
 
-    It is a line of others, or lies just beyond. It may cost nearly nothing, or whatever its steps
-    cost if no height at the nodes U, V changes.
+    It is, whatever its steps cost, if no height at the nodes U, V changes.
     """
     is_low = edge in (U0, V0)
     hidden = seen_to - volumes[k, edge] if is_low else volumes[k, edge] - seen_to
     if hidden < HIDDEN_M:
         return volumes, value
-    just_beyond = seen_to - COVER_M if is_low else seen_to + COVER_M
-    for place in (*list_near_lines(volumes, scene, k, edge, seen_to), just_beyond):
-        trial = volumes.copy()
-        trial[k, edge] = place
-        if not has_width(trial[k]):
-            continue
-        trial_value = compute_objective(trial, scene)
-        if trial_value <= value + SLACK_UNITS * scene.evidence:
-            return trial, trial_value
-        if not changes_heights(volumes, trial, k, edge, U, V):
-            return trial, trial_value
-    return volumes, value
+    trial = volumes.copy()
+    trial[k, edge] = seen_to - COVER_M if is_low else seen_to + COVER_M
+    if changes_heights(volumes, trial, k, edge, U, V):
+        return volumes, value
+    return trial, compute_objective(trial, scene)
 
 
 def changes_heights(
@@ -122,33 +113,3 @@ def changes_heights(
     U, V = (np.ascontiguousarray(axis[:, is_between]) for axis in (U, V))
     heights = [compute_roof_heights(rows, U, V, UNSORTED)[0] for rows in (volumes, trial)]
     return not np.array_equal(*heights)
-
-
-def has_width(row: np.ndarray) -> bool:
-    """Return whether a volume's rectangle holds more than a line.
-
-    One that is visible at one line of nodes may end as a line.
-    """
-    return bool(row[U0] < row[U1] and row[V0] < row[V1])
-
-
-def list_near_lines(
-    volumes: np.ndarray, scene: Scene, k: int, edge: int, seen_to: float
-) -> list[float]:
-    """Return the nearest line to `seen_to`, in a list, or an empty list without any.
-
-    It is another volume's edge or a corner of the outline.
-    """
-    axis, direction = (edge - U0) // 2, int(volumes[k, DIRECTION])
-    column = U0 + 2 * axis
-    other_rows = [
-        row
-        for j, row in enumerate(volumes[1:, [column, column + 1, DIRECTION]].tolist(), start=1)
-        if j != k
-    ]
-    edges = [x for *ends, along in other_rows if along == direction for x in ends]
-    near_lines = [x for x in edges if abs(x - seen_to) < NEAR_EDGE_M]
-    near_lines += [
-        x for x in scene.vertices[direction, axis].tolist() if abs(x - seen_to) < NEAR_VERTEX_M
-    ]
-    return [min(near_lines, key=lambda x: abs(x - seen_to))] if near_lines else []
