@@ -91,7 +91,6 @@ def write_report(
     path: Path,
     run: EvaluatedRun,
     title: str = "hiproof",
-    most_shown: int = MOST_SHOWN,
     changes: tuple[str, list[dict[str, Any]]] = ("", []),
 ) -> None:
     """Write the page to `path`. Raises OutputError when the file cannot be written.
@@ -100,7 +99,7 @@ def write_report(
     """
     from ..write.files import atomic_file
 
-    page = report_html(run, title, most_shown, changes)
+    page = report_html(run, title, changes=changes)
     with atomic_file(path) as file:
         file.write(page.encode())
 

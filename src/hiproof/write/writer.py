@@ -9,6 +9,8 @@ from contextlib import AbstractContextManager, ExitStack
 from dataclasses import replace
 from typing import Any, BinaryIO, Self
 
+import numpy as np
+
 from ..model import Building
 from .building_attributes import measure_figures
 from .files import atomic_file
@@ -31,6 +33,7 @@ class BuildingWriter(AbstractContextManager["BuildingWriter", bool | None]):
     def __init__(self, path: str | os.PathLike[str], head: FileHead) -> None:
         self.path, self.head = path, head
         self.names, self.gml_names = UniqueNames(), UniqueNames()
+        self.low, self.high = np.full(3, np.inf), np.full(3, -np.inf)
 
     def add_all(self, buildings: Iterable[Building]) -> None:
         """Write the file with all these buildings."""
@@ -51,6 +54,12 @@ class BuildingWriter(AbstractContextManager["BuildingWriter", bool | None]):
     @abstractmethod
     def fragment(sheet: Sheet) -> Fragment:
         """Return a building's part of the file, made here or in another process."""
+
+    def extend(self, fragment: Fragment) -> None:
+        """Take a building's part into the extent of the file, from `low` to `high` (3,)."""
+        if fragment.extent is not None:
+            self.low = np.minimum(self.low, fragment.extent[:3])
+            self.high = np.maximum(self.high, fragment.extent[3:])
 
     @abstractmethod
     def put(self, fragment: Fragment) -> None:

@@ -328,10 +328,10 @@ class Ledger:
             )
         ]
 
-    def failures(self, limit: int = 20) -> list[Failure]:
-        """Return the first buildings that hit an internal error."""
+    def failures(self) -> list[Failure]:
+        """Return the first 20 buildings that hit an internal error."""
         sql = (
             "select id, detail from building where status = 'internal_error' order by position "
-            "limit ?"
+            "limit 20"
         )
-        return list(map(Failure._make, self.database.execute(sql, (limit,))))
+        return list(map(Failure._make, self.database.execute(sql)))

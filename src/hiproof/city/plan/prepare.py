@@ -18,7 +18,7 @@ from ...read.crs import horizontal_crs, names_place, same_horizontal
 from ...read.crs.operations import Operation, find_operation, warn_if_coarse
 from ...read.crs.positions import doubtful_place, format_box, reproject_positions
 from ...read.outlines.database import is_database
-from ...read.outlines.footprints import meets, read_footprints
+from ...read.outlines.footprints import find_middle, meets, read_footprints
 from ...read.points.pointcloud import as_input_error, format_others, read_header
 from ...read.terrain import read_terrain
 from ...read.terrain.raster import RasterTerrain
@@ -290,17 +290,16 @@ def list_operations(
 
     There is none where both are the same or one is unknown. A warning says where it is coarse.
     """
-    boxes = shapely.bounds([job.area for job in jobs])
-    boxes = boxes[np.isfinite(boxes).all(axis=1)]
+    areas = np.array([job.area for job in jobs if not job.area.is_empty])
     if (
         source is None
         or target is None
         or same_horizontal(source, target)
-        or not len(boxes)
+        or not len(areas)
         or not (names_place(source) and names_place(target))
     ):
         return []
-    middle = frame.units.from_metres(np.median((boxes[:, :2] + boxes[:, 2:]) / 2, axis=0)[None])
+    middle = frame.units.from_metres(np.array([find_middle(areas)]))
     x, y = reproject_positions(middle, frame.crs, source)[0]
     place = float(x), float(y)
     operation = find_operation(subject, horizontal_crs(source), horizontal_crs(target), place)

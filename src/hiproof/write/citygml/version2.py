@@ -106,7 +106,6 @@ class CityGMLWriter(BuildingWriter):
     def __init__(self, path: str | os.PathLike[str], head: FileHead) -> None:
         super().__init__(path, head)
         self.srs_name = srs_name(self.head.crs_of_files)
-        self.low, self.high = np.full(3, np.inf), np.full(3, -np.inf)
 
     def begin(self, stack: ExitStack) -> None:
         declared = " ".join(f'xmlns:{prefix}="{uri}"' for prefix, uri in self.namespaces.items())
@@ -133,9 +132,7 @@ class CityGMLWriter(BuildingWriter):
         return Fragment(text, (*xyz.min(axis=0).tolist(), *xyz.max(axis=0).tolist()))
 
     def put(self, fragment: Fragment) -> None:
-        if fragment.extent is not None:
-            self.low = np.minimum(self.low, fragment.extent[:3])
-            self.high = np.maximum(self.high, fragment.extent[3:])
+        self.extend(fragment)
         self.file.write(b"\n" + fragment.text)
 
     def finish(self) -> None:

@@ -68,7 +68,6 @@ class CityJSONWriter(BuildingWriter):
         super().__init__(path, head)
         self.reference_system = reference_system(self.head.crs_of_files)
         self.is_document = str(path).endswith(".json")
-        self.low, self.high = np.full(3, np.inf), np.full(3, -np.inf)
         self.vertex_count = self.object_count = 0
 
     def begin(self, stack: ExitStack) -> None:
@@ -106,9 +105,7 @@ class CityJSONWriter(BuildingWriter):
 
     def put(self, fragment: Fragment) -> None:
         """Write a building whose line is about this file's offset."""
-        if fragment.extent is not None:
-            self.low = np.minimum(self.low, fragment.extent[:3])
-            self.high = np.maximum(self.high, fragment.extent[3:])
+        self.extend(fragment)
         if self.is_document:
             self.add_to_document(json.loads(fragment.text))
         else:
