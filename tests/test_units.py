@@ -12,7 +12,6 @@ import pytest
 import rasterio
 import shapely
 from lxml import etree
-from rasterio.transform import from_origin
 
 from hiproof import read_parameters
 from hiproof.city.folder.ledger import Ledger
@@ -28,6 +27,7 @@ from hiproof.read.crs import find_units
 from hiproof.read.models.solids import read_solids
 from hiproof.settings import Settings
 from hiproof.write.tables.postgis import database_rows
+from layers import write_raster
 from read.test_lax import write_lax
 from read.test_pointcloud import write_copc
 from tiny_town import ORIGIN, make_town, write_cloud, write_footprints
@@ -208,28 +208,20 @@ def test_points_and_footprints_are_read_in_metres_and_say_what_they_were(tmp_pat
         assert shapely.normalize(got.polygon).equals_exact(shapely.normalize(true), 1e-6)
 
 
-def write_plane(path, crs, size, height, unit=None):
-    with rasterio.open(
-        path, "w", driver="GTiff", width=9, height=9, count=1, dtype="float64", crs=crs,
-        transform=from_origin(-4.5 * size, 4.5 * size, size, size),
-    ) as file:  # fmt: skip
-        file.write(np.full((1, 9, 9), height))
-        if unit:
-            file.units = (unit,)
-    return path
-
-
 @pytest.mark.parametrize(
-    ("crs", "size", "height", "unit", "expected"),
+    ("crs", "unit", "expected"),
     [
-        ("EPSG:2263", 10.0, 10.0, None, 10 * US_FOOT),
-        ("EPSG:2263", 10.0, 10.0, "metre", 10.0),
-        ("EPSG:2263", 10.0, 10.0, "ft", 3.048),
-        (None, 10.0, 10.0, None, 10 * US_FOOT),
+        ("EPSG:2263", None, 10 * US_FOOT),
+        ("EPSG:2263", "metre", 10.0),
+        ("EPSG:2263", "ft", 3.048),
+        (None, None, 10 * US_FOOT),
     ],
 )
-def test_a_terrain_model_in_feet_answers_in_metres(tmp_path, crs, size, height, unit, expected):
-    path = write_plane(tmp_path / "dtm.tif", crs, size, height, unit)
+def test_a_terrain_model_in_feet_answers_in_metres(tmp_path, crs, unit, expected):
+    path = write_raster(tmp_path / "dtm.tif", np.full((9, 9), 10.0), -45.0, 45.0, 10.0, crs)
+    if unit:
+        with rasterio.open(path, "r+") as file:
+            file.units = (unit,)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         terrain = read_terrain(path, "EPSG:2263", FEET)

@@ -57,6 +57,9 @@ def test_clicks_show_buildings_and_the_choice_their_colours(browser, address, ru
         before = shown.evaluate(FILL)
         shown.locator('#map [data-building="0"]').dispatch_event("click")
         assert {"house-1", "rf_volume_lod22"} <= set(shown.inner_text("#details").split())
+        shown.locator("[data-select]").first.dispatch_event("click")
+        assert "block 2" in shown.inner_text("#details")
+        shown.locator('#map [data-building="0"]').dispatch_event("click")
         assert shown.evaluate("Boolean(viewer.gl)")
         shown.mouse.click(*shown.evaluate(ON_ROOF, 1))
         assert "block 2" in shown.inner_text("#details")
@@ -65,8 +68,6 @@ def test_clicks_show_buildings_and_the_choice_their_colours(browser, address, ru
             shown.select_option("#mode", value)
             fills[value] = shown.evaluate(FILL)
         assert fills["type"] == before and len(set(fills.values()) - {fills["quality"]}) == 3
-        shown.locator("[data-select]").first.dispatch_event("click")
-        assert "block 2" in shown.inner_text("#details")
 
 
 @needs_browser

@@ -136,12 +136,12 @@ def test_points_of_a_courtyard_that_the_outline_lacks_are_named():
     assert any(reason.endswith("m below the model") for reason in verdict.reasons)
 
 
-@pytest.mark.parametrize("side_m", [10.0, 30.0, 100.0])
+@pytest.mark.parametrize("side_m", [10.0, 30.0, 80.0])
 @pytest.mark.parametrize("off_m", [-2.0, 1.0, 2.5])
 def test_a_place_of_several_square_metres_off_the_roof_is_never_good(side_m, off_m):
     """However large the building is."""
     outline, good = shapely.box(0, 0, side_m, side_m), []
-    for seed in range(20):
+    for seed in range(10):
         rng = np.random.default_rng(seed)
         xy = rng.uniform(0, side_m, (int(4 * side_m**2), 2))
         middle = rng.uniform(3.0, side_m - 3.0, 2)
@@ -197,13 +197,13 @@ def test_a_tower_that_reaches_over_a_place_without_points_is_not_good(width_m, t
     """The place beside the tower holds no points, and the model goes on there at its height."""
     good, size = [], (width_m + 30.0, 30.0)
     model = stepped(width_m + too_wide_m, high, size)
-    for seed in range(20):
+    for seed in range(10):
         rng = np.random.default_rng(seed)
         xy = rng.uniform((0, 0), size, (int(4 * size[0] * size[1]), 2))
         xy = xy[(xy[:, 0] < width_m) | (xy[:, 0] > width_m + too_wide_m)]
         z = np.where(xy[:, 0] < width_m, high, 6.0) + rng.normal(0, 0.05, len(xy))
         good.append(judge_model(model, np.column_stack([xy, z])).grade is Grade.GOOD)
-    assert sum(good) >= 18 if too_wide_m == 0 else not any(good)
+    assert sum(good) >= 9 if too_wide_m == 0 else not any(good)
 
 
 def test_points_off_along_the_outline_alone_do_not_count():

@@ -13,7 +13,6 @@ from experiments.cramer_rao import (
     compute_height_information,
 )
 
-from hiproof.errors import FitError
 from hiproof.primitives import CATALOGUE
 
 EXAMPLES = {
@@ -125,8 +124,3 @@ def test_the_covariance_is_symmetric_and_positive():
 def test_edges_say_nothing_of_heights():
     primitive, theta = make_theta("hip")
     assert not compute_edge_information(primitive, theta, 4.72)[5:].any()
-
-
-def test_dimensions_that_are_missing_are_refused():
-    with pytest.raises((FitError, KeyError)):
-        CATALOGUE["gable"].vertices({"width": 8})

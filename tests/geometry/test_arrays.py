@@ -22,7 +22,7 @@ from hiproof.geometry.grid import cell_range, count_cells, number_cells
 from hiproof.geometry.point_grid import PointGrid
 from hiproof.geometry.point_in_polygon import flips
 from hiproof.geometry.rings import ring_normal, ring_normals
-from hiproof.geometry.thin import rank_in_cells, without_repeats
+from hiproof.geometry.thin import thin_to_grid, without_repeats
 from hiproof.model import Footprint
 
 # few numbers, so that many are equal
@@ -89,9 +89,7 @@ def test_one_point_a_cell_equals_the_plain_loop(spread, cell_m):
         [*np.mean(members, axis=0)[:2], np.sort([p[2] for p in members])[(len(members) - 1) // 2]]
         for _, members in sorted(slow.items())
     ]
-    assert np.allclose(
-        rank_in_cells(xyz, cell_m, lambda counts: (counts - 1) // 2), expected, atol=1e-9
-    )
+    assert np.allclose(thin_to_grid(xyz, cell_m), expected, atol=1e-9)
 
 
 MOST = 12

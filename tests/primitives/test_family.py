@@ -70,18 +70,11 @@ def sort_planes(planes):
 
 
 @each_shape
-def test_planes_follow_from_the_description(shape):
+@pytest.mark.parametrize("as_catalogue", [True, False], ids=["by its type", "side by side"])
+def test_planes_follow_from_the_description(shape, as_catalogue):
     for member in members(shape):
-        planes = compute_planes(member.name, *member.describe())
-        assert sort_planes(planes) == pytest.approx(sort_planes(member.planes()), abs=1e-9)
-
-
-@each_shape
-def test_planes_follow_from_the_description_side_by_side(shape):
-    for member in members(shape):
-        parameters, kappa, translation = member.describe(as_catalogue=False)
-        if any(member.has):  # a flat roof has no side to be described by
-            planes = compute_planes(member.name, parameters, kappa, translation)
+        if as_catalogue or any(member.has):  # a flat roof has no side to be described by
+            planes = compute_planes(member.name, *member.describe(as_catalogue=as_catalogue))
             assert sort_planes(planes) == pytest.approx(sort_planes(member.planes()), abs=1e-9)
 
 

@@ -96,6 +96,7 @@ def test_the_page_shows_the_tiles_and_tells_of_a_building_clicked(browser, tiles
         height = page.evaluate("scene.canvas.clientHeight")
         page.click("#scene", position={"x": 2, "y": height - 2})
         assert page.inner_text("#details") == told
+        page.evaluate("document.activeElement.blur()")  # keys count wherever the focus is
         page.keyboard.press("Escape")
         assert page.inner_text("#details") == ""
         page.evaluate("() => { scene.target[0] += 1e6; }")
