@@ -86,7 +86,7 @@ def make_clear_sky(place: Any) -> tuple[Any, Any]:
 
     The turbidity is Linke's, from pvlib.
     """
-    times = list_hours() + import_module("pandas").Timedelta(minutes=30)
+    times = shift_hours(list_hours(), 0.5)
     return times, place.get_clearsky(times)
 
 
@@ -116,7 +116,7 @@ def read_year(path: str) -> Weather:
     """Read a file of weather and check it against the sun over its station."""
     try:
         weather = parse_weather(Path(path))
-        weather.values[["ghi", "dhi", "dni"]].to_numpy(float)
+        weather = weather._replace(values=weather.values[["ghi", "dhi", "dni"]].astype(float))
     except (OSError, ValueError, KeyError, IndexError, TypeError, StopIteration) as error:
         raise InputError(
             f"expected weather of a typical year as EPW, TMY3 or PVGIS in {path}, got "
@@ -199,7 +199,7 @@ def refuse_other_hours(weather: Weather, path: str) -> None:
 
 def refuse_missing_hours(weather: Weather, path: str) -> None:
     """Raise InputError where radiation is missing."""
-    rows = weather.values[["ghi", "dhi", "dni"]].to_numpy(float)
+    rows = weather.values.to_numpy()
     is_missing = ~((rows >= 0) & (rows < MISSING_WM2)).all(axis=1)
     if is_missing.any():
         raise InputError(
@@ -212,7 +212,7 @@ def refuse_missing_hours(weather: Weather, path: str) -> None:
 
 def refuse_other_sun(weather: Weather, path: str) -> None:
     """Raise InputError for radiation that does not fit the sun over the station."""
-    ghi, dhi, dni = (weather.values[name].to_numpy(float) for name in ("ghi", "dhi", "dni"))
+    ghi, dhi, dni = weather.values.to_numpy().T
     rises = measure_rises(weather)
     rise = rises[1]
     ceiling = import_pvlib().irradiance.get_extra_radiation(weather.times).to_numpy()
@@ -272,7 +272,7 @@ def warn_of_dull_sun(path: str, diffuse_share: float, brightness: float) -> None
 
 def warn_of_repeated_hours(weather: Weather, path: str) -> None:
     """Warn of days with the radiation of an earlier one, and of hours with that of the last."""
-    hours = weather.values[["ghi", "dhi", "dni"]].to_numpy(float)
+    hours = weather.values.to_numpy()
     days = hours.reshape(-1, 24, 3)
     _, first, kind = np.unique(
         days.reshape(len(days), -1), axis=0, return_index=True, return_inverse=True
@@ -302,7 +302,7 @@ def warn_of_repeated_hours(weather: Weather, path: str) -> None:
 
 def warn_of_moved_sun(weather: Weather, rises: np.ndarray, path: str) -> None:
     """Warn of direct radiation that fits the sun of another time better (`rises` as measured)."""
-    ghi, dhi, dni = (weather.values[name].to_numpy(float) for name in ("ghi", "dhi", "dni"))
+    ghi, dhi, dni = weather.values.to_numpy().T
     early, gap, late = np.abs(ghi - dhi - dni * rises).sum(axis=1)
     if min(early, late) < MOVED * gap and gap > LEAST_MOVED * ghi.sum():
         warn(
@@ -319,10 +319,9 @@ def measure_rises(weather: Weather) -> np.ndarray:
 
     It is 0 below the horizon.
     """
-    pvlib, minute = import_pvlib(), import_module("pandas").Timedelta(minutes=1)
-    place = pvlib.location.Location(*weather.where)
+    place = import_pvlib().location.Location(*weather.where)
     zeniths = [
-        place.get_solarposition(weather.times + minutes * minute)["zenith"].to_numpy()
+        place.get_solarposition(shift_hours(weather.times, minutes / 60))["zenith"].to_numpy()
         for minutes in SUN_MINUTES
     ]
     rises = np.maximum(np.cos(np.radians(zeniths)), 0.0)

@@ -77,7 +77,7 @@ class IfcModel:
         self.file.header.file_name.originating_system = "hiproof"
         self.buildings: list[Any] = []
         self.styles: dict[Look, Any] = {}
-        self.origin: np.ndarray | None = None
+        self.origin = np.zeros(3)
         axes = self.make("IfcAxis2Placement3D", Location=self.point(np.zeros(3)))
         self.context = self.make(
             "IfcGeometricRepresentationContext",
@@ -108,7 +108,7 @@ class IfcModel:
 
     def add(self, model: ViewedModel) -> None:
         """Add a building with its body and its properties."""
-        if self.origin is None:
+        if not self.buildings:
             self.origin = model.corner
         key = self.keys.take_at(model.id, model.solid.vertices)
         building = self.make_rooted(
@@ -230,7 +230,7 @@ class IfcModel:
             )
         )
         units = self.make("IfcUnitAssignment", Units=[metre, square, cube, radian])
-        town = self.keys.name_square(np.zeros(3) if self.origin is None else self.origin)
+        town = self.keys.name_square(self.origin)
         project = self.make_rooted(
             "IfcProject",
             town,
@@ -256,7 +256,7 @@ class IfcModel:
         from ...read.crs import find_units
 
         units = find_units(CRS(crs))
-        origin = units.from_metres(np.zeros(3) if self.origin is None else self.origin)
+        origin = units.from_metres(self.origin)
         projected = self.make(
             "IfcProjectedCRS",
             Name=crs_name(crs),
