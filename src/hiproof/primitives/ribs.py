@@ -90,10 +90,11 @@ def fill_rim(corners: np.ndarray, step: float) -> np.ndarray:
     turns, is_side = after[:, 0] - corners[:, 0], corners[:, 2] > 0.0
     is_side &= turns < WIDEST_RAD
     usual = np.median(turns[is_side]) if is_side.any() else step
+    counts = np.where(is_side, 1, np.maximum(np.round(turns / usual), 1)).astype(int)
     rim = [
-        before + share * (later - before)
-        for before, later, turn, joined in zip(corners, after, turns, is_side, strict=True)
-        for share in np.arange(0.0, 1.0, 1.0 if joined else 1.0 / max(round(turn / usual), 1))
+        before + k / count * (later - before)
+        for before, later, count in zip(corners, after, counts.tolist(), strict=True)
+        for k in range(count)
     ]
     angle, distance, _ = np.array(rim).T
     return distance[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
