@@ -22,7 +22,16 @@ from hiproof.model import Building
 
 from .judging import load_tool
 from .tables import FigureTable, make_parser
-from .wireframes import COLUMNS, Score, WireframeCounts, list_worst, make_cells, make_size_rows
+from .wireframes import (
+    COLUMNS,
+    Score,
+    WireframeCounts,
+    count_wrong_on_lines,
+    find_tolerance,
+    list_worst,
+    make_cells,
+    make_size_rows,
+)
 
 MODES = {"points": "points only", "footprints": "with footprints"}
 SHORT_M = 1.0
@@ -57,15 +66,21 @@ def compare_building(
 ) -> tuple[WireframeCounts, tuple[int, int]]:
     """Return a building's counts, and its numbers of short edges and right ones."""
     corners, edges = judge.model_wireframe(building)
-    tolerance = judge.judge.NEAR * np.linalg.norm(points - points.mean(axis=0), axis=1).max()
+    tolerance = find_tolerance(judge.judge, points)
     right, right_corners, height_errors = judge.matched(
         corners, edges, true_corners, true_edges, tolerance
     )
     ends = corners[edges.ravel()].reshape(-1, 2, 3)
     short = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1) < SHORT_M
     right_edges = (int(right.sum()), len(edges), len(true_edges))
+    true = true_corners, true_edges
     counts = WireframeCounts(
-        *right_edges, right_corners, len(corners), len(true_corners), height_errors
+        *right_edges,
+        right_corners,
+        len(corners),
+        len(true_corners),
+        height_errors,
+        wrong_on_lines=count_wrong_on_lines(judge.judge, (corners, edges), true, tolerance),
     )
     return counts, (int(short.sum()), int(right[short].sum()))
 

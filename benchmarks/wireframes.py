@@ -101,19 +101,26 @@ def count_wireframes(models: Path, truth: Path) -> dict[str, WireframeCounts]:
                 *comparison["corners"],
                 comparison["found"],
                 *comparison["faces"],
-                count_wrong_on_lines(judge, drawn, reference),
+                count_wrong_on_lines(judge, drawn, reference, find_tolerance(judge, reference[0])),
             )
             counts[name] = WireframeCounts(*numbers, comparison["offset"], rmse)
     return counts
 
 
-def count_wrong_on_lines(judge: ModuleType, drawn: tuple, true: tuple) -> int:
-    """Count the wrong edges of a wireframe that overlap a true one on its line."""
-    (p, edges, _), (t, true_edges, _) = drawn, true
+def find_tolerance(judge: ModuleType, points: np.ndarray) -> float:
+    """Return how far (m) a right edge may lie off, for the points (n, 3) of a roof."""
+    return judge.NEAR * float(np.linalg.norm(points - points.mean(axis=0), axis=1).max())
+
+
+def count_wrong_on_lines(judge: ModuleType, drawn: tuple, true: tuple, near: float) -> int:
+    """Count the wrong edges, further than `near` (m), that overlap a true one on its line.
+
+    A wireframe is corners (n, 3), edges (k, 2) and more.
+    """
+    (p, edges, *_), (t, true_edges, *_) = drawn, true
     if not len(edges):
         return 0
     gaps = judge.edge_distances(p[edges], t[true_edges])
-    near = judge.NEAR * np.linalg.norm(t - t.mean(axis=0), axis=1).max()
     rows, columns = linear_sum_assignment(gaps)
     wrong = np.delete(p[edges], rows[gaps[rows, columns] <= near], axis=0)[:, None]
     start, end = np.swapaxes(t[true_edges], 0, 1)
