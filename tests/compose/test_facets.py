@@ -55,7 +55,7 @@ def test_a_finer_tolerance_has_more_facets_and_the_same_volume(kind, fewest):
     usual, fine = compose_with(roof, 0.1), compose_with(roof, 0.03)
     assert not check_solid(fine)
     assert len(fine.select_faces(ROOF)) >= max(fewest, 1.5 * len(usual.select_faces(ROOF)))
-    assert fine.volume == pytest.approx(usual.volume, rel=0.005)
+    assert fine.volume == pytest.approx(usual.volume, rel=0.006)
 
 
 def test_facets_of_a_cone_keep_within_the_tolerance():
@@ -73,8 +73,8 @@ def test_facets_of_a_cone_keep_within_the_tolerance():
 def test_an_eave_along_corners_of_the_outline_is_level_between_them(kind):
     """Facets of other directions would cut it into teeth, whatever the corners and the top."""
     rng = np.random.default_rng(7)
-    for sides in range(6, 13):
-        radius, away = rng.uniform(4.0, 8.0), rng.uniform(-0.03, 0.03, 2)
+    for sides in range(6, 25, 3):
+        radius, away = rng.uniform(2.0, 8.0), rng.uniform(-0.03, 0.03, 2)
         turns = (np.arange(sides) + rng.uniform(-0.2, 0.2, sides)) * 2.0 * np.pi / sides
         if kind == "half_cone":  # its wall is the side at -u
             turns = (np.arange(sides) / (sides - 1.0) - 0.5) * np.pi
@@ -118,6 +118,6 @@ def test_a_file_of_parameters_keeps_the_tolerance(tmp_path):
     build_file(tmp_path / "parameters.jsonl", tmp_path / "out")
     (id, solid), *_ = read_solids(tmp_path / "out" / "buildings.city.jsonl")
     strips = len(shape.refine(roof.parts[0].parameters, 0.03).planes)
-    assert strips - 2 > len(shape.planes)  # the top two strips of each slope are narrow
-    assert (id, len(solid.select_faces(ROOF))) == ("hall", strips - 2)
+    assert strips > len(shape.planes)
+    assert (id, len(solid.select_faces(ROOF))) == ("hall", strips)
     assert solid.volume == pytest.approx(hall.solid.volume, rel=1e-6)

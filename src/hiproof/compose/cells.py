@@ -16,6 +16,7 @@ import shapely
 from ..errors import CompositionError
 from ..geometry.components import label_components
 from ..model import Roof
+from ..primitives.catalogue import SMOOTH
 from .arrangement import (
     GRID_M,
     OUTSIDE,
@@ -30,6 +31,7 @@ from .arrangement import (
     trace_faces,
 )
 
+NO_CURVE = -1
 SAME_UNITS = 1e-3  # of heights that are one
 UNSEEN_UNITS = 100.0  # a centimetre: a face thinner than that is none
 BEYOND_UNITS = 1000.0  # a decimetre by which a face may rise or fall further than what is around it
@@ -41,11 +43,13 @@ def merge_slivers(
     traced: HalfEdges,
     label: np.ndarray,
     patched: np.ndarray,
-    planes: np.ndarray,
+    problem: PlanProblem,
     min_area: float,
     min_width: float,
 ) -> None:
     """Give every region too small or thin to a neighbour, smallest first, in `label` (f,).
+
+    Facets of one curve are as thin as they are together.
 
     The neighbour is the one with the longest common border. A patch alone comes last, for what lies
     between it and the region it belongs to may become that region's. One that would carry its plane
@@ -64,7 +68,10 @@ def merge_slivers(
         is_border = beside[:, 0] != beside[:, 1]
         border = np.bincount(beside.ravel(), np.repeat(length * is_border, 2), len(first))
         is_inner = is_border & (label[sides] != OUTSIDE).all(axis=1)
-        is_sliver = (size < min_area) | (2 * size < min_width * border)
+        curve = np.where(label >= 0, problem.curve[np.maximum(label, 0)], NO_CURVE)[sides]
+        is_rim = is_border & ((curve[:, 0] != curve[:, 1]) | (curve[:, 0] == NO_CURVE))
+        rim = np.bincount(beside.ravel(), np.repeat(length * is_rim, 2), len(first))
+        is_sliver = (size < min_area) | (2 * size < min_width * rim)
         slivers = np.unique(beside[is_inner])
         slivers = slivers[is_sliver[slivers] & ~keeps_out[first[slivers]]]
         if not len(slivers):
@@ -78,7 +85,9 @@ def merge_slivers(
         ends, at = xy[edges[is_border][is_end]], beside[is_border][is_end]
         neighbour = np.where(at[:, 0] == smallest, at[:, 1], at[:, 0])
         shared = length[is_border][is_end]
-        heir = choose_heir(ends, neighbour, shared, label[first], planes, smallest, is_unseen)
+        heir = choose_heir(
+            ends, neighbour, shared, label[first], problem.planes, smallest, is_unseen
+        )
         if heir == OUTSIDE:
             keeps_out |= region == smallest
         else:
@@ -140,7 +149,8 @@ class PlanProblem:
 
     Polygons are soups of edges: polygon 0 is the outline, polygon k + 1 that of piece k. `planes`
     (p, 3) give heights in grid units; `group` (p,) the first plane equal to each within its roof
-    part, `part` (p,) the roof part it belongs to. `patches` are (soup, label) pairs that overrule
+    part, `part` (p,) the roof part it belongs to, `curve` (p,) the same for facets of a curved one,
+    else NO_CURVE. `patches` are (soup, label) pairs that overrule
     the height function.
     """
 
@@ -149,6 +159,7 @@ class PlanProblem:
     plane_start: np.ndarray
     group: np.ndarray
     part: np.ndarray
+    curve: np.ndarray
     patches: list[tuple[np.ndarray, int]] = field(default_factory=list)
 
 
@@ -212,6 +223,7 @@ def plan_problem(roof: Roof) -> PlanProblem:
         plane_start,
         equal_planes(stacked),
         np.repeat(part, counts),
+        np.repeat([k if roof.parts[k].type in SMOOTH else NO_CURVE for k in part], counts),
     )
 
 
@@ -259,7 +271,7 @@ def find_cells(problem: PlanProblem, reach: float, min_area: float, min_width: f
     xy, edges = node(np.concatenate(soups).astype(np.int64), reach)
     traced = trace_faces(xy, edges)
     label, patched = label_faces(traced.polygons, problem)
-    merge_slivers(xy, edges, traced, label, patched, problem.planes, min_area, min_width)
+    merge_slivers(xy, edges, traced, label, patched, problem, min_area, min_width)
     keep_largest_component(traced, label)
     return PlanCells(*dissolve(xy, edges, label[traced.face].reshape(-1, 2)))
 
@@ -362,6 +374,7 @@ def cover_gap(problem: PlanProblem, gap: np.ndarray, neighbour: np.ndarray) -> P
         np.append(problem.plane_start, problem.plane_start[-1] + upper - lower),
         np.concatenate((problem.group, problem.group[lower:upper])),
         np.concatenate((problem.part, problem.part[lower:upper])),
+        np.concatenate((problem.curve, problem.curve[lower:upper])),
         problem.patches,
     )
 

@@ -16,12 +16,12 @@ from ..geometry.rings import counterclockwise
 from ..model import Part, Piece
 from .catalogue import CATALOGUE
 from .contract import CX, CY, HALF_LENGTH, HALF_WIDTH, Primitive
-from .facets import find_apothem
+from .facets import MOST_FACETS, find_apothem
 
 FEWEST_CORNERS = 4  # Corners of the outline on a rim: fewer lie there by chance.
 ON_RIM = (0.95, 1.15)  # Distances of such corners, in radii of the circle with the rim's area.
 ON_PLAN_M = 0.02  # Farthest (m) of a corner from the border of the part's plan.
-LEAST_STEP = 0.5  # Angle of a facet, in those of the regular shape: others follow the next corner.
+LEAST_STEP = 0.25  # Angle of a facet at least, in those of the regular shape.
 WIDEST_RAD = 0.5 * math.pi  # A facet takes less of the rim.
 
 
@@ -35,7 +35,9 @@ def draw_facets(part: Part, outline: shapely.Polygon, chord_m: float) -> Part:
         return part
     shape = refine(part.parameters, chord_m)
     theta = shape.to_theta(part.parameters, part.kappa, part.translation)
-    corners = list_rim_corners(part, theta, outline, 2.0 * math.pi / count_sides(part, shape))
+    sides = count_sides(part, shape)
+    least = max(LEAST_STEP / sides, len(shape.planes) / sides / MOST_FACETS)
+    corners = list_rim_corners(part, theta, outline, 2.0 * math.pi * least)
     if len(corners) < FEWEST_CORNERS:
         return replace(part, pieces=shape.make_pieces(part.outlines, shape.planes_at(theta)))
     return replace(part, pieces=draw_between(part, shape, theta, corners))
@@ -56,12 +58,12 @@ def find_axis(part: Part, theta: np.ndarray) -> np.ndarray:
 
 
 def list_rim_corners(
-    part: Part, theta: np.ndarray, outline: shapely.Polygon, step: float
+    part: Part, theta: np.ndarray, outline: shapely.Polygon, least: float
 ) -> np.ndarray:
     """List the corners (n, 3) of an outline on a round part's rim, counter-clockwise.
 
     They are the angle around the axis, the distance (m) from it, and 1 where a side of the outline
-    leads to the next one, else 0.
+    leads to the next one, else 0. They are `least` (rad) apart.
     """
     ring = counterclockwise(outline.exterior)[:-1]
     x, y = (ring - find_axis(part, theta)).T
@@ -74,7 +76,7 @@ def list_rim_corners(
     corners = np.column_stack([np.arctan2(y, x), distances, np.roll(is_rim, -1)])[is_rim]
     kept: list[np.ndarray] = []
     for corner in corners[np.argsort(corners[:, 0])]:
-        if kept and corner[0] - kept[-1][0] < LEAST_STEP * step:
+        if kept and corner[0] - kept[-1][0] < least:
             kept[-1][2] = min(kept[-1][2], corner[2])
         else:
             kept.append(corner)

@@ -19,6 +19,7 @@ from ...primitives.catalogue import CATALOGUE
 from ...primitives.cone import BROACH_SIDES, HEXAGON_SIDES
 from ...primitives.contract import CX, CY, HALF_LENGTH, HALF_WIDTH, KAPPA, Q0, Q1, Primitive
 from ...primitives.facets import find_apothem
+from ...primitives.revolved import NECK
 from .accept import CIRCLE_NUMBERS, PartsRoof
 from .arcs import APSE_DEG, TURRET_DEG, Arc, cut_to_outline
 from .regions import cut_part, list_polygons
@@ -59,6 +60,7 @@ MOST_OVER = 0.5  # The same above it, in FOLLOW_M: beside a spire on a tower all
 SLOPES_TRIED, BENDS_TRIED = 24, 7  # Slopes, in equal ratios, and bends of an onion that are tried.
 TURNS_TRIED = 3  # Turns of a spire that are tried within one of its facets.
 TOP_FOLLOW_M = 0.5  # Points so near (m in height) to a steep top lie on it.
+BULGE_SEEN = 0.5  # Share of the points beyond the neck of an onion that lie on it.
 TOP_SEEN = 0.3  # Share of the height of an onion's top that points must reach.
 
 
@@ -256,16 +258,20 @@ def find_start(
 
 
 def is_top_seen(part: Part, points: np.ndarray) -> bool:
-    """Return whether points (n, 3) reach far enough up the top of an onion.
+    """Return whether points (n, 3) reach far enough up the top of an onion, and show its bulge.
 
-    It may be as high as anything above them. Other shapes have no top of their own.
+    It may be as high as anything above them, and a slim spire's bulge may lie below other roofs.
+    Other shapes have no top of their own.
     """
     if part.type != "onion":
         return True
     height, neck = part.parameters["height"], part.parameters["neck_height"]
     follows = np.abs(points[:, 2] - part.height_at(points[:, :2])) <= TOP_FOLLOW_M
     reached = points[follows, 2].max(initial=-np.inf) - part.translation[2]
-    return bool(reached >= neck + TOP_SEEN * (height - neck))
+    away = np.hypot(*(points[:, :2] - part.translation[:2]).T)
+    bulge = follows[away > 0.5 * NECK * part.parameters["width"]]
+    is_bulge_seen = bool(bulge.mean() >= BULGE_SEEN) if len(bulge) else False
+    return is_bulge_seen and bool(reached >= neck + TOP_SEEN * (height - neck))
 
 
 def make_part(
