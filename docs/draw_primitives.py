@@ -28,8 +28,9 @@ HEAD = """# Roof types and their parameters
 - Circles are written with as many facets as keep them within 0.1 m, and with the circle's area. A
   dome and a barrel follow a circular arc in four chords or more on each side. Set
   `chord_tolerance_m` in `[compose]` for finer or coarser facets; roofs are fitted with those of
-  0.1 m. No shape has more than 256 facets, and faces below `min_face_width_m` still join a
-  neighbour.
+  0.1 m. Where the rim follows corners of the outline, facets lie between these, so that a dome over
+  nine walls has nine ribs. No shape has more than 256 facets, and none joins a neighbour for being
+  narrower than `min_face_width_m`.
 - An onion is a bulge with a pointed top. Its eave lies at its widest circle. Walls are vertical, so
   the model leaves out how the bulge draws in below that. The `neck_height` is the height at which
   the top begins, at two fifths of the radius; it is at most three fifths of the `height`.

@@ -8,10 +8,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+from benchmarks.samples import training_sample
 
 from hiproof.segment import NOT_ROOF, Segmentation, segment
 from hiproof.segment.scores import Scores
-from hiproof.simulate import ROOF_TYPES, training_sample
+from hiproof.simulate import ROOF_TYPES
 
 from .data import MOST_ROWS, ROOFN3D_TYPES, SHARED, read_roofn3d_roofs
 from .output import Options, Result, Table

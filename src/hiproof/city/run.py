@@ -149,7 +149,7 @@ def reconstruct_in_folder(
             )
         clock.lap("plan")
         if ledger.open_tasks("sort") or ledger.open_tasks("solve"):
-            executor.prepare(WITHOUT_FOOTPRINTS if request.footprints is None else MAIN_JOB)
+            executor.prepare(list_compiled_pieces(request))
         clock.lap("prepare")
         queue = Queue(plan, state, ledger, executor, request.clouds, request.terrain, progress)
         queue.work_off("sort", steps.sort_cloud)
@@ -182,6 +182,11 @@ def reconstruct_in_folder(
         with suppress(sqlite3.Error):
             ledger.interrupt()
         ledger.close()
+
+
+def list_compiled_pieces(request: Request) -> tuple[str, ...]:
+    """Return the pieces of compiled code that the run needs."""
+    return WITHOUT_FOOTPRINTS if request.footprints is None else MAIN_JOB
 
 
 class Clock:

@@ -40,18 +40,25 @@ def moves() -> None:
 
     Moves come first, so that `planes` is ready elsewhere when it is needed.
     """
-    from ...fit.roof import fit_building
+    from ...fit.roof import fit_building, start_roof
+    from ...fit.roof.copies import add_copy, list_copies
+    from ...fit.roof.site import make_site
     from ...fit.shapes.rounds import find_disc, measure_round_gaps
+    from ...fit.union.add import UNEXPLAINED
     from ...fit.union.improve import improve
     from ...fit.union.objective import compute_objective
     from ...fit.union.volumes import make_base
 
-    scene, base = make_house_scene()[1], make_base(-3.0)
+    (plan, scene), base = make_house_scene(), make_base(-3.0)
     value = compute_objective(base, scene)
     improve(base, scene, value, np.array([0.7]), 1)
     fit_building(house(), L_OUTLINE)
     centre, _ = find_disc(house(), np.zeros(2), 1.0)  # a house so simple asks for none
     measure_round_gaps(house(), centre)
+    site = make_site(scene, OUTLINE, 1.0, plan.border)
+    roof = start_roof(base, scene, site)
+    list_copies(roof, site, site.bounds, UNEXPLAINED)
+    add_copy(roof, 0, 1.0, 0.0)
 
 
 def planes() -> None:
