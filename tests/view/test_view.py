@@ -159,7 +159,9 @@ def test_tiles_that_cannot_be_read_are_said(browser, tiles, tmp_path):
     ):
         (folder / file).unlink()
         with view(browser, folder) as page:
-            page.get_by_text(message).wait_for()
+            said = page.get_by_text(message)
+            said.wait_for()
+            assert said.is_visible()
 
 
 def test_page_and_tiles_are_served_at_a_port_of_their_own(tiles):

@@ -31,7 +31,7 @@ from .arrangement import (
     trace_faces,
 )
 
-NO_CURVE = -1
+NO_CURVE = -1  # Of what is no facet of a curved part.
 SAME_UNITS = 1e-3  # of heights that are one
 UNSEEN_UNITS = 100.0  # a centimetre: a face thinner than that is none
 BEYOND_UNITS = 1000.0  # a decimetre by which a face may rise or fall further than what is around it
@@ -58,6 +58,7 @@ def merge_slivers(
     sides, length = traced.face.reshape(-1, 2), edge_lengths(xy, edges)
     area = shapely.area(traced.polygons)
     keeps_out = np.zeros(len(label), bool)
+    curves = np.where(np.isin(problem.part, problem.curved), problem.part, NO_CURVE)
     for _ in range(len(label)):
         links = sides[label[sides[:, 0]] == label[sides[:, 1]]].T
         region = label_components(len(label), links)
@@ -68,7 +69,7 @@ def merge_slivers(
         is_border = beside[:, 0] != beside[:, 1]
         border = np.bincount(beside.ravel(), np.repeat(length * is_border, 2), len(first))
         is_inner = is_border & (label[sides] != OUTSIDE).all(axis=1)
-        curve = np.where(label >= 0, problem.curve[np.maximum(label, 0)], NO_CURVE)[sides]
+        curve = np.where(label >= 0, curves[np.maximum(label, 0)], NO_CURVE)[sides]
         is_rim = is_border & ((curve[:, 0] != curve[:, 1]) | (curve[:, 0] == NO_CURVE))
         rim = np.bincount(beside.ravel(), np.repeat(length * is_rim, 2), len(first))
         is_sliver = (size < min_area) | (2 * size < min_width * rim)
@@ -149,9 +150,8 @@ class PlanProblem:
 
     Polygons are soups of edges: polygon 0 is the outline, polygon k + 1 that of piece k. `planes`
     (p, 3) give heights in grid units; `group` (p,) the first plane equal to each within its roof
-    part, `part` (p,) the roof part it belongs to, `curve` (p,) the same for facets of a curved one,
-    else NO_CURVE. `patches` are (soup, label) pairs that overrule
-    the height function.
+    part, `part` (p,) the roof part it belongs to. `curved` are the curved roof parts. `patches` are
+    (soup, label) pairs that overrule the height function.
     """
 
     soups: list[np.ndarray]
@@ -159,7 +159,7 @@ class PlanProblem:
     plane_start: np.ndarray
     group: np.ndarray
     part: np.ndarray
-    curve: np.ndarray
+    curved: tuple[int, ...]
     patches: list[tuple[np.ndarray, int]] = field(default_factory=list)
 
 
@@ -223,7 +223,7 @@ def plan_problem(roof: Roof) -> PlanProblem:
         plane_start,
         equal_planes(stacked),
         np.repeat(part, counts),
-        np.repeat([k if roof.parts[k].type in SMOOTH else NO_CURVE for k in part], counts),
+        tuple(k for k, one in enumerate(roof.parts) if one.type in SMOOTH),
     )
 
 
@@ -374,7 +374,7 @@ def cover_gap(problem: PlanProblem, gap: np.ndarray, neighbour: np.ndarray) -> P
         np.append(problem.plane_start, problem.plane_start[-1] + upper - lower),
         np.concatenate((problem.group, problem.group[lower:upper])),
         np.concatenate((problem.part, problem.part[lower:upper])),
-        np.concatenate((problem.curve, problem.curve[lower:upper])),
+        problem.curved,
         problem.patches,
     )
 

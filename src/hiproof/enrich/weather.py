@@ -314,10 +314,9 @@ def warn_of_moved_sun(weather: Weather, rises: np.ndarray, path: str) -> None:
 
 
 def measure_rises(weather: Weather) -> np.ndarray:
-    """Return the sine (3, n) of the sun's elevation, the mean around 20 minutes before each time,
-    around it, and around 20 minutes after it.
+    """Return sines (3, n) of the sun's elevation 20 minutes before each time, then, and 20 after.
 
-    It is 0 below the horizon.
+    Each is the mean around its time, and 0 below the horizon.
     """
     place = import_pvlib().location.Location(*weather.where)
     zeniths = [

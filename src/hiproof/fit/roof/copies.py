@@ -6,7 +6,8 @@ import numpy as np
 
 from ...compiled import compiled
 from ..union.objective import compute_point_cost
-from .price import compute_costs, list_points, widen
+from .draw import is_near
+from .price import compute_costs, list_points
 from .tables import N_SIDES, VOLUME_COUNT, add_line, find_lowest_plane, place_volume, read_line
 
 MOST_COPIED_M = 8.0  # Size (m) of the largest volume that is copied.
@@ -25,13 +26,12 @@ def list_copies(roof, site, box, unexplained):
     points = points[: np.searchsorted(points, site.n)]
     costs = compute_costs(roof, site, np.arange(roof.counts[VOLUME_COUNT]), points)
     points, costs = points[costs > unexplained], costs[costs > unexplained]
-    near, count = widen(box, REACH_M), 0
-    most = 2 * roof.counts[VOLUME_COUNT] + 1
+    count, most = 0, 2 * roof.counts[VOLUME_COUNT] + 1
     found, gains = np.empty((most, 3)), np.zeros(most)
     for k in range(roof.counts[VOLUME_COUNT]):
         x0, x1, y0, y1 = roof.boxes[k]
-        is_near = x0 < near[1] and x1 > near[0] and y0 < near[3] and y1 > near[2]
-        if roof.n_planes[k] == 0 or max(x1 - x0, y1 - y0) > MOST_COPIED_M or not is_near:
+        is_small = max(x1 - x0, y1 - y0) <= MOST_COPIED_M
+        if roof.n_planes[k] == 0 or not is_small or not is_near(roof.boxes[k], box, REACH_M):
             continue
         for side in range(0, N_SIDES, 2):
             a, b, _ = read_line(roof, roof.sides[k, side])

@@ -28,8 +28,8 @@ from .regions import cut_part, list_polygons
 class RoundShape(NamedTuple):
     """How a shape is fitted around a centre.
 
-    `free` are the numbers of its plan that points determine. Over an arc, it has `sides`,
-    or as many as the arc, which is `span_deg` long.
+    `free` are the numbers of its plan that points determine. Over an arc, it has `sides`, or
+    as many as the arc, which is `span_deg` long.
     """
 
     free: tuple[int, ...]
