@@ -6,6 +6,9 @@ Passwords in addresses are masked where a message is made, so that none reaches 
 another process.
 """
 
+import errno
+import os
+import re
 import traceback
 import warnings
 from pathlib import Path
@@ -18,7 +21,46 @@ class HiproofError(Exception):
     """Base of every error hiproof raises on purpose, a text for the user without traceback."""
 
     def __init__(self, message: str = ""):
-        super().__init__(mask(str(message)))
+        super().__init__(mask(put_plainly(str(message))))
+
+
+OS_ERROR = re.compile(r"\[(?:Errno|WinError) (-?\d+)\] ([^:\n;]+)(?:: '[^']*')?")
+"""What Python says of a path that cannot be used; the sentence around it names the path."""
+
+WORDS_OF_OS = {
+    errno.ENOENT: "no such file",
+    errno.EISDIR: "a folder",
+    errno.ENOTDIR: "a file in place of a folder",
+}
+
+
+NO_TEXT = re.compile(r"'[\w-]+' codec can't decode bytes? [^:]*: [\w ]+")
+
+
+def put_plainly(text: str) -> str:
+    """Return a text in which what Python says of files and their bytes is put in words.
+
+    >>> put_plainly("expected settings, got: [Errno 21] Is a directory: 'a.toml'; name a file")
+    'expected settings, got: a folder; name a file'
+    """
+
+    def name(found: re.Match[str]) -> str:
+        return WORDS_OF_OS.get(int(found[1]), found[2][0].lower() + found[2][1:])
+
+    return NO_TEXT.sub("bytes that are no text", OS_ERROR.sub(name, text))
+
+
+def explain_unreadable(path: str | os.PathLike[str]) -> str:
+    """Return why no program can read a file of this machine, "" where nothing tells.
+
+    >>> explain_unreadable("nowhere/at.all")
+    'no such file'
+    """
+    try:
+        with open(path, "rb") as file:
+            return "" if file.read(1) else "an empty file"
+    except OSError as error:
+        return put_plainly(str(error))
 
 
 class InputError(HiproofError):

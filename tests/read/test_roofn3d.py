@@ -110,7 +110,7 @@ def test_what_is_not_roofn3d_gets_one_full_sentence(tmp_path, text, words):
 
 
 def test_a_missing_file_and_the_wrong_file_are_refused(tmp_path, buildings):
-    with pytest.raises(InputError, match="No such file"):
+    with pytest.raises(InputError, match="no such file"):
         list(read_roofn3d(tmp_path / "none.csv"))
     with pytest.raises(InputError, match="fk_buildings"):
         list(read_roofn3d_labels(buildings, iter(())))

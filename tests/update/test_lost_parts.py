@@ -71,6 +71,30 @@ def test_what_lies_bare_is_lost_at_any_density(run, density, code, tmp_path):
         assert outlines[0].area - outlines[1].area == pytest.approx(area, rel=0.25), id
 
 
+@pytest.mark.parametrize("density", [4.0, 12.0])
+def test_a_small_rest_that_stands_is_not_demolished(run, density, tmp_path):
+    """A quarter of a house, and a tower that is new, are more than nothing."""
+    town = make_town(seed=7, density=density)
+    lost_m2 = lay_bare(town, "house-0", 0.25)
+    lay_bare(town, "house-2", 0.0)
+    x0, y0, x1, y1 = town.footprints["house-2"].bounds
+    tower = shapely.box(x0, y0, x0 + 0.3 * (x1 - x0), y1)
+    is_tower = shapely.intersects_xy(tower, *town.xyz[:, :2].T)
+    town.xyz[is_tower, 2] += 9.0
+    town.classification[is_tower] = 6
+    lay_bare(town, "house-3", 0.0)
+    before, after = by_id(run), update(run, tmp_path / "out", town)
+    for id in ("house-0", "house-2"):
+        assert after[id]["change"]["class"] == "changed", id
+        assert take_kind(after[id]) == "part_removed", id
+    outlines = [
+        shapely.Polygon(row["parts"][0]["outlines"][0][0])
+        for row in (before["house-0"], after["house-0"])
+    ]
+    assert outlines[0].area - outlines[1].area == pytest.approx(lost_m2, rel=0.2)
+    assert take_kind(after["house-3"]) == "demolished"
+
+
 def stand_on_slope(town, slope):
     """Raise the ground of a town to a slope to the east and to the north, and houses with it."""
     places = town.xyz[:, :2].copy()

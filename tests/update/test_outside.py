@@ -2,6 +2,7 @@
 
 import csv
 import json
+import time
 
 import numpy as np
 import pyogrio
@@ -56,6 +57,34 @@ def update(tmp_path_factory):
         (second,), folder / "out", run=folder / "run", run_parameters=parameters, date=DATE
     )
     return update_area(request), folder / "out"
+
+
+@pytest.mark.parametrize("far_m", [5e5, 2e6])
+def test_points_far_away_cost_no_time(far_m, tmp_path):
+    """As those of a file in another CRS: thousands of kilometres of squares lie between."""
+    town = make_town()
+    first, second, third = (
+        str(write_cloud(tmp_path / f"{name}.laz", xyz, town.classification))
+        for name, xyz in (
+            ("a", town.xyz),
+            ("b", town.xyz + 0.01),
+            ("c", town.xyz + [far_m, far_m, 0]),
+        )
+    )
+    footprints = str(write_footprints(tmp_path / "footprints.geojson", town.footprints))
+    reconstruct_area(Request((first,), tmp_path / "run", footprints))
+    parameters = str(tmp_path / "run" / "parameters.jsonl")
+    request = UpdateRequest(
+        (second, third),
+        tmp_path / "out",
+        run=tmp_path / "run",
+        run_parameters=parameters,
+        date=DATE,
+    )
+    start = time.process_time()
+    summary = update_area(request)
+    assert time.process_time() - start < 60.0
+    assert summary.by_change == {"unchanged": len(town.footprints)}
 
 
 def test_roofs_outside_all_outlines_are_told_apart(update):

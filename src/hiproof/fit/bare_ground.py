@@ -107,7 +107,8 @@ def find_bare_ground(
 ) -> BareGround | None:
     """Return the bare ground inside `outline`, None where there is little.
 
-    Where it is known that it `was_roof`, less is enough, in any direction.
+    Where it is known that it `was_roof`, less is enough, in any direction, and most of the outline
+    may be bare.
 
     roof: (n, 2 or more) points of roofs, trees and whatever else stands high; ground: (m, 2 or
     more) points of the ground; all in one frame in metres.
@@ -127,11 +128,8 @@ def find_bare_ground(
         return None
     area = outline.area - best.remainder.area
     parts = sorted(shapely.get_parts(best.remainder), key=shapely.area, reverse=True)
-    is_one = (
-        bool(parts)
-        and parts[0].area > 0.9 * best.remainder.area
-        and parts[0].area > (1 - MOST_CUT) * outline.area
-    )
+    least_left_m2 = LEAST_AREA_M2 if was_roof else (1 - MOST_CUT) * outline.area
+    is_one = bool(parts) and parts[0].area > max(0.9 * best.remainder.area, least_left_m2)
     return BareGround(parts[0], outline.area - parts[0].area) if is_one else BareGround(None, area)
 
 

@@ -8,6 +8,7 @@ Chance makes single such cells, but hardly ever several side by side.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -77,17 +78,42 @@ def find_clusters(comparison: CellComparison, stray: float = CELL_CHANCE) -> lis
     `stray` is the share of cells that contradict an unchanged roof.
     """
     c = comparison
-    is_other = flag_cells(c)
-    cells = int(c.is_compared.sum())
-    keys, result = c.cells.astype(np.int64) @ KEY_OF_CELL, []
+    is_other, cells, result = flag_cells(c), int(c.is_compared.sum()), []
     for sign in (1.0, -1.0):
-        is_chosen = is_other & (sign * c.difference > 0)
-        linked = np.flatnonzero(is_chosen | ~c.is_compared)
-        labels = label_components(len(linked), link_neighbours(keys[linked]))
-        for label in np.unique(labels[is_chosen[linked]]):
-            members = linked[labels == label]
-            result.append(describe_cluster(c, members[is_chosen[members]], cells, stray))
+        for members in group_cells(c, is_other & (sign * c.difference > 0)):
+            result.append(describe_cluster(c, members, cells, stray))
     return sorted(result, key=lambda cluster: (-len(cluster.members), cluster.members[0]))
+
+
+def group_cells(comparison: CellComparison, is_chosen: np.ndarray) -> Iterator[np.ndarray]:
+    """Yield the members of each group of chosen cells (k,) side by side.
+
+    Cells that one survey left empty by chance do not part a group.
+    """
+    keys = comparison.cells.astype(np.int64) @ KEY_OF_CELL
+    linked = np.flatnonzero(is_chosen | ~comparison.is_compared)
+    labels = label_components(len(linked), link_neighbours(keys[linked]))
+    for label in np.unique(labels[is_chosen[linked]]):
+        members = linked[labels == label]
+        yield members[is_chosen[members]]
+
+
+def measure_roof(comparison: CellComparison, members: np.ndarray) -> float:
+    """Return the area (m2) of cells `members` (m,) in which points form a roof, 0 for none."""
+    chosen = np.isin(comparison.number, members)
+    if not forms_roof(comparison.points[chosen]):
+        return 0.0
+    return measure_area(comparison, comparison.number[chosen])
+
+
+def measure_area(comparison: CellComparison, numbers: np.ndarray) -> float:
+    """Return the area (m2) that points in the cells `numbers` (n,) stand for."""
+    return float((1 / comparison.n_new[numbers]).sum()) * comparison.cell_m2
+
+
+def forms_roof(points: np.ndarray) -> bool:
+    """Return whether points (n, 3) lie on a surface that is no strip."""
+    return measure_roughness(points) < ROUGH_M and not is_strip(points)
 
 
 def flag_cells(comparison: CellComparison) -> np.ndarray:
@@ -140,11 +166,11 @@ def describe_cluster(
     points, numbers = comparison.points[chosen], comparison.number[chosen]
     return ChangedCells(
         members,
-        float((1 / comparison.n_new[numbers]).sum()) * comparison.cell_m2,
+        measure_area(comparison, numbers),
         compute_chance(len(members), float((np.abs(d) / s).min()), cells, stray),
         float(np.median(d)),
         float(np.sqrt(MEDIAN_VARIANCE * np.mean(s**2) / len(members))),
-        measure_roughness(points) < ROUGH_M and not is_strip(points),
+        forms_roof(points),
     )
 
 

@@ -16,7 +16,7 @@ from ..geometry.grid import AROUND_KEYS, KEY_OF_CELL
 from ..model import Roof
 from ..status import Change
 from .cells import CellComparison, compare_points, predict_occupancy
-from .clusters import KEPT_SHARE, ChangedCells, find_clusters
+from .clusters import KEPT_SHARE, ChangedCells, find_clusters, group_cells, measure_roof
 from .ground import Ground
 from .register import SurveyShift
 
@@ -42,6 +42,10 @@ which on pulses pass it, as glass lets most of them. Under a roof that is gone h
 
 SMALLEST_M2 = 2.0
 """Area (m2) below which a cluster is a chimney, an aerial or the edge of something."""
+
+SMALL_M2 = 12.0
+"""Area (m2) below which an addition is a dormer or the like, and what is left of a building is
+none."""
 
 DOUBTFUL_M2 = 4.0
 """Area (m2) from which on points that lie on no surface make a building uncertain."""
@@ -82,7 +86,8 @@ def judge_building(
         return ChangeVerdict(Change.NOT_COVERED, comparison, ground)
     was_roof, on_ground = find_bare(comparison, roof, ground)
     is_passed = passes_pulses(comparison, was_roof, on_ground, np.arange(len(comparison.cells)))
-    if is_gone(comparison, was_roof, on_ground) and not is_passed:
+    is_bare = is_gone(comparison, was_roof, on_ground) and not is_passed
+    if is_bare and measure_standing(comparison, roof, ground) < SMALL_M2:
         return ChangeVerdict(Change.GONE, comparison, ground, 0.0)
     found = [c for c in find_clusters(comparison, shift.noise.stray) if c.area_m2 >= SMALLEST_M2]
     likely = [c for c in found if c.chance < significance]
@@ -140,6 +145,17 @@ def is_gone(comparison: CellComparison, was_roof: np.ndarray, on_ground: np.ndar
         for cells in (was_roof & on_ground & is_other, was_roof, comparison.is_compared)
     )
     return bare >= max(FEWEST_COMPARED, GONE_SHARE * roof, LEAST_ROOF * all_cells)
+
+
+def measure_standing(comparison: CellComparison, roof: Roof, ground: Ground) -> float:
+    """Return the largest area (m2) of a roof in the new points, of the earlier building or another.
+
+    Crowns form no roof, and heaps are lower than one.
+    """
+    c = comparison
+    heights = find_heights(roof, c) + c.new - ground.height_at(c.centres)
+    is_high = c.is_compared & (heights > 2 * OVER_GROUND_M)
+    return max((measure_roof(c, members) for members in group_cells(c, is_high)), default=0.0)
 
 
 def passes_pulses(

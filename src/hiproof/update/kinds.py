@@ -16,7 +16,7 @@ from ..model import Roof
 from ..status import ChangeKind
 from .cells import MEDIAN_VARIANCE, CellComparison, find_slopes
 from .clusters import ChangedCells
-from .judge import OVER_GROUND_M, ChangeVerdict, find_heights
+from .judge import OVER_GROUND_M, SMALL_M2, ChangeVerdict, find_heights
 from .lineage import show_parts
 
 ALIKE_SHARE, ALIKE_M = 0.2, (0.1, 0.25)
@@ -43,9 +43,8 @@ AS_ONE_SHARE = 0.65
 SAME_PART = 0.6
 """Intersection over union from which on two parts take the same place."""
 
-SMALL_M2, THIN_LAYER_M = 12.0, 0.25
-"""Area (m2) below which an addition is a dormer or the like, and the height (m) below which it is a
-layer on the roof, such as solar panels."""
+THIN_LAYER_M = 0.25
+"""Height (m) below which an addition is a layer on the roof, such as solar panels."""
 
 FAMILIES = (
     ("gable", "asymmetric_gable"),

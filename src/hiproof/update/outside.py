@@ -82,13 +82,14 @@ class SurveyCells:
                 self.found[kind].append(average_cells(rows))
 
     def save(self, path: Path) -> None:
-        """Write the cells of a file, with the corners (2, 2) of their box."""
+        """Write the cells of a file, the corners (2, 2) of their box, and squares with roofs."""
         path.parent.mkdir(parents=True, exist_ok=True)
         arrays: dict[str, Any] = {kind: join_cells(found) for kind, found in self.found.items()}
         xy = np.concatenate(list(arrays.values()))[:, :2]
         box = [xy.min(axis=0, initial=np.inf), xy.max(axis=0, initial=-np.inf)]
         with atomic_file(path) as file:
-            np.savez(file, **arrays, box=box, has_classes=self.has_classes)
+            squares = find_squares(find_cells(arrays["roof"]))
+            np.savez(file, **arrays, box=box, squares=squares, has_classes=self.has_classes)
 
 
 def sort_survey(folder: str, number: int, address: str, epoch: str = "") -> dict:
@@ -175,29 +176,26 @@ def save_roofs_outside(state: Path, plan: WorkPlan, has_earlier: bool) -> None:
     jobs = [job for job in plan.jobs if not job.area.is_empty]
     outlines, names = shapely.STRtree([job.area for job in jobs]), [job.id for job in jobs]
     found = []
-    for corner in list_corners([*list_files(folders[0]), *list_files(folders[1])]):
-        low, high = corner - BLOCK_REACH_M, corner + BLOCK_M + BLOCK_REACH_M
+    files = [path for folder in folders for path in list_files(folder)]
+    squares = [np.load(path)["squares"] for path in files]
+    for square in np.unique(np.concatenate([np.empty((0, 2)), *squares]), axis=0):
+        low = square * BLOCK_M - BLOCK_REACH_M
+        high = (square + 1) * BLOCK_M + BLOCK_REACH_M
         new, old = (load_survey(folder, low, high) for folder in folders)
         roofs = find_unmapped(new, old["roof"] if has_earlier else None, outlines)
         if has_earlier:
             roofs += find_fresh(new["roof"], old, outlines, names, ChangeKind.BUILT)
             roofs += find_fresh(old["roof"], new, outlines, [], ChangeKind.DEMOLISHED)
         for place, roof in roofs:
-            column, row = np.floor((np.array(place.bounds[:2]) - corner) / BLOCK_M)
-            if column == row == 0:
+            if (find_squares(np.array([place.bounds[:2]])) == square).all():
                 polygons = [outline_record(polygon) for polygon in shapely.get_parts(place)]
                 found.append(roof | {"outlines": polygons})
     save_text(state / OUTSIDE_FILE, json.dumps(found) + "\n")
 
 
-def list_corners(files: list[Path]) -> list[np.ndarray]:
-    """Return the lower left corners (2,) of the squares that hold all cells."""
-    boxes = np.array([np.load(path)["box"] for path in files]).reshape(-1, 2, 2)
-    low, high = boxes[:, 0].min(axis=0, initial=np.inf), boxes[:, 1].max(axis=0, initial=-np.inf)
-    if not np.isfinite(low).all():
-        return []
-    columns, rows = np.floor((high - np.floor(low)) / BLOCK_M).astype(int) + 1
-    return [np.floor(low) + BLOCK_M * np.array(place) for place in np.ndindex(columns, rows)]
+def find_squares(cells: np.ndarray) -> np.ndarray:
+    """Return the squares (k, 2) of BLOCK_M in which cells (n, 2) lie."""
+    return np.unique(np.floor(cells / BLOCK_M), axis=0)
 
 
 def load_roofs_outside(state: Path) -> list[dict[str, Any]]:

@@ -208,18 +208,20 @@ class Updater:
         return dataclasses.replace(building, shift=(x, y))
 
     def lose_parts(self, job: Job, building: Building, lost: LostParts) -> Building:
-        """Return a building made again without `lost` parts, where its model covers them."""
+        """Return a building made again without `lost` parts, where its model covers them.
+
+        So is one without a model, of which a small part still stands.
+        """
         trust = self.plan.settings.reconstruct.footprint_trust
-        if building.built is None or job.index in self.overrides or trust == "full":
+        covered_m2 = math.inf if building.built is None else lost.measure_under(building)
+        if not covered_m2 or job.index in self.overrides or trust == "full":
             return building
-        smaller = (
-            lost.make_smaller_job(job, building.shift) if lost.measure_under(building) else None
-        )
+        smaller = lost.make_smaller_job(job, building.shift)
         if smaller is None:
             return building
         new = self.epochs.new.without_moving()
         result, _ = solve_one(self.plan, smaller, new, None, self.keep)
-        if result.built is None or lost.measure_under(result) >= lost.measure_under(building):
+        if result.built is None or lost.measure_under(result) >= covered_m2:
             return building
         area_m2 = job.area.area - smaller.area.area
         result = dataclasses.replace(result, footprint=building.footprint, shift=building.shift)

@@ -87,7 +87,7 @@ def explain_unreadable(path: Any, expected: str, error: Exception) -> InputError
     elif isinstance(error, FileNotFoundError):
         got = "none; check the path"
     else:
-        got = f"one that is not: {error}; check the path"
+        got = f"{error}; check the path"
     return InputError(f"expected {expected} at {path}, got {got}")
 
 

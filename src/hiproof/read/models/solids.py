@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError
+from ...errors import InputError, explain_unreadable
 from ...frames import METRES, Units
 from ...log import count_things
 from ...model import WALL, Face, Solid
@@ -182,7 +182,8 @@ def citygml_solids(
                 del element.getparent()[0]
     except (etree.XMLSyntaxError, OSError) as error:
         raise InputError(
-            f"expected well-formed CityGML in {path}, got: {error}; the file is damaged or cut off"
+            f"expected well-formed CityGML in {path}, got "
+            f"{explain_unreadable(path) or f'{error}; the file is damaged or cut off'}"
         ) from error
     if members == 0:
         raise InputError(

@@ -30,7 +30,6 @@ from ..crs import (
 from ..crs.operations import find_operation, warn_if_coarse
 from ..crs.positions import format_box, refuse_degrees
 from ..names import READING
-from ..remote import is_url
 from .database import is_database, read_table, table_crs
 from .geoparquet import is_parquet
 from .polygons import Features, is_surface, simple_polygons
@@ -129,7 +128,6 @@ def read_features(
     remember(str(path))
     if is_database(path):
         return read_table(str(path), where)
-    refuse_missing(path)
     features = read_file(
         path, layer, where, lambda crs: bbox and box_in(plan_crs(crs, path), bbox, bbox_crs)
     )
@@ -180,18 +178,6 @@ def refuse_nothing(
     raise InputError(
         f"expected footprints in {path}, got a layer without features; name another file or layer"
     )
-
-
-def refuse_missing(path: str | Path) -> None:
-    """Raise InputError where a local file is not there, or empty."""
-    if is_url(path) or str(path).startswith(("/vsi", "PG:")):
-        return
-    if not Path(path).exists():
-        raise InputError(f"expected footprints at {path}, got no such file; check the path")
-    if Path(path).is_file() and Path(path).stat().st_size == 0:
-        raise InputError(
-            f"expected footprints in {path}, got an empty file; copy or download it again"
-        )
 
 
 def box_in(crs: CRS | None, bbox: Box, bbox_crs: CRS | None) -> Box:

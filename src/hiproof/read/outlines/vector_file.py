@@ -16,8 +16,9 @@ import pyogrio
 from pyogrio.errors import DataLayerError, DataSourceError, FeatureError, FieldError, GeometryError
 from pyogrio.util import vsi_path
 
-from ...errors import InputError, warn
+from ...errors import InputError, explain_unreadable, warn
 from ...frames import Box
+from ..remote import is_url
 from .attribute_columns import make_known_condition, restore_declared_types
 from .polygons import Features, decode_geometries
 
@@ -240,8 +241,10 @@ def translate_read_errors(path: str | Path, info: dict[str, Any] | None = None) 
 
 
 def unreadable(path: str | Path, error: Exception) -> InputError:
+    is_local = not is_url(path) and not str(path).startswith(("/vsi", "PG:"))
     # what follows is advice on GDAL's own options
     reason = str(error).partition("; It might help")[0].rstrip(".")
+    reason = (is_local and explain_unreadable(path)) or reason
     return InputError(
         f"expected a vector file that GDAL reads (GeoPackage, GeoJSON, Shapefile, ...) at {path}, "
         f"got: {reason}; check the file, or convert it with ogr2ogr"

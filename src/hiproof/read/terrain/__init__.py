@@ -12,7 +12,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ...errors import InputError
+from ...errors import InputError, explain_unreadable
 from ...frames import Units
 from .raster import RasterTerrain, import_rasterio
 
@@ -79,6 +79,7 @@ def read_terrain(path: str | Path, crs: Any = None, units: Units | None = None) 
     `terrain`.
     """
     import_rasterio()
-    if "://" not in str(path) and not str(path).startswith("/vsi") and not Path(path).is_file():
-        raise InputError(f"expected a terrain model at {path}, got no such file; check the path")
+    is_local = "://" not in str(path) and not str(path).startswith("/vsi")
+    if is_local and (reason := explain_unreadable(path)):
+        raise InputError(f"expected a terrain model at {path}, got {reason}; check the path")
     return RasterTerrain(path, crs, units)
