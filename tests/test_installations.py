@@ -115,7 +115,7 @@ def test_a_house_of_given_parts_has_its_chimney():
 @pytest.mark.parametrize(
     ("change", "reason"),
     [
-        ({"type": "flag"}, "expected chimney or roof_object as the type of installation 0"),
+        ({"type": "flag"}, r"\(chimney, roof_object\) as the type of installation 0"),
         ({"parameters": {"width": 1.0}}, "expected length, width, height over 0 as the parameters"),
         ({"colour": "red"}, "got also colour"),
         ({"position": [0, 0]}, "position of installation 0"),

@@ -200,7 +200,7 @@ def test_an_edited_house_keeps_its_overhangs():
         ({"overhangs": [{"edge": 0, "length": -1}]}, "expected a length over 0 m"),
         ({"overhangs": [{"edge": 0, "length": 0.5, "side": 1}]}, "got also side"),
         ({"roof_thickness": 0}, "expected a roof_thickness over 0 m"),
-        ({"footprint_kind": "eaves"}, "expected a footprint_kind of walls or roof"),
+        ({"footprint_kind": "eaves"}, r"\(walls, roof\) as footprint_kind"),
     ],
 )
 def test_what_makes_no_overhang_is_one_sentence(change, reason):

@@ -477,7 +477,7 @@ def test_tables_override_too(town_files, tmp_path):
     [
         ('{"id": "a", "type": "hip"}\n{"id": "a", "type": "gable"}\n', "two that differ of 'a'"),
         ('{"id": "a", "type": "hip"\n', "line 1 of .* column"),
-        ('\n{"id": "a", "type": "igloo"}\n', "line 2 of .*: expected roof types"),
+        ('\n{"id": "a", "type": "igloo"}\n', "line 2 of .*: expected a roof type"),
         ('{"id": "café", "type": "hip"}\n'.encode("latin-1"), "save it as UTF-8"),
     ],
 )

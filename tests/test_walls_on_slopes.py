@@ -115,7 +115,7 @@ def test_an_edited_house_keeps_its_walls_on_the_terrain():
 
 def test_other_walls_are_refused():
     record = building_record(reconstruct("terrain", Hill()))
-    with pytest.raises(InputError, match="expected walls of level or terrain, got"):
+    with pytest.raises(InputError, match=r"\(level, terrain\) as walls, got"):
         hiproof.build({**record, "walls": "steep"})
     level = hiproof.build({**record, "walls": "level"})
     assert len(level.solid.select_faces(GROUND)) == 1

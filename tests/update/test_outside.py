@@ -143,8 +143,11 @@ def test_build_makes_the_same_tables_of_the_parameters(update, tmp_path):
     ("value", "words"),
     [
         ({"survey": 5}, "expected text as survey"),
-        ({"survey": DATE, "roofs": []}, "expected the keys survey, roofs_outside of update"),
-        ({"survey": DATE, "roofs_outside": [{"area": "x"}]}, "as area of roof 0 of roofs_outside"),
+        ({"survey": DATE, "roofs": []}, "expected the keys survey, roofs_outside of the update"),
+        (
+            {"survey": DATE, "roofs_outside": [{"kind": "built", "area": "x"}]},
+            "as the area of roof 0 of roofs_outside",
+        ),
     ],
 )
 def test_a_head_that_no_update_wrote_is_refused(value, words, update, tmp_path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -20,106 +21,78 @@ from ..model import (
     Roof,
     Underside,
 )
-from ..model.installation import CHIMNEY, ROOF_OBJECT
-from ..model.overhang import ROOF_EDGE, WALLS
+from ..model.overhang import WALLS
 from ..read.models.damage import excerpt
 from ..settings import ComposeSettings, Settings
-from .record import (
-    figure,
-    list_at,
-    measure,
-    number,
-    numbers_by_name,
-    on_grid,
-    polygon,
-    read_building,
-    read_position,
-    refuse_other_keys,
-    require_code,
-    require_mapping,
-)
+from .record import make_building, on_grid, read_object, read_position, require_mapping
 
 
-def read_underside(record: Mapping[str, Any], building: Building, roof: Roof) -> Underside:
-    """Read a solid's lower end in the frame of its `roof`; InputError for what makes none."""
-    walls = record.get("walls", "level")
-    require_code(walls, ("level", "terrain"), "walls of level or terrain", "; choose one")
-    lines = building.terrain_intersection if walls == "terrain" else ()
+def make_underside(values: Mapping[str, Any], building: Building, roof: Roof) -> Underside:
+    """Make a solid's lower end in the frame of its `roof`; InputError for what makes none."""
+    origin = roof.frame.origin
+    lines = building.terrain_intersection if values.get("walls") == "terrain" else ()
+    passages = values.get("passages", ())
     return Underside(
-        terrain=tuple(line - roof.frame.origin for line in lines),
-        passages=tuple(
-            read_passage(item, f"passage {k}", float(roof.frame.origin[2]))
-            for k, item in enumerate(list_at(record, "passages"))
-        ),
+        terrain=tuple(line - origin for line in lines),
+        passages=tuple(make_passage(passage, float(origin[2])) for passage in passages),
     )
 
 
 def read_passage(record: Any, label: str, z_origin: float) -> Passage:
     """Read a passage; its ceiling is in the world, `z_origin` the height of the frame."""
-    refuse_other_keys(record, "passage", label)
-    outline = on_grid(polygon(record.get("outline"), f"the outline of {label}"))
-    ceiling = measure(record.get("ceiling"), f"the ceiling of {label}")
-    return Passage(outline, round_number(ceiling, PLAN_DIGITS) - z_origin)
+    return make_passage(read_object(record, "passage", label), z_origin)
+
+
+def make_passage(values: Mapping[str, Any], z_origin: float) -> Passage:
+    ceiling = round_number(values["ceiling"], PLAN_DIGITS)
+    return Passage(on_grid(values["outline"]), ceiling - z_origin)
 
 
 MOST_OVERHANG_M = 10.0  # longer ones are typing errors
 
 
-def read_eaves(record: Mapping[str, Any], roof: Roof) -> Eaves | None:
-    """Read the overhangs, None without a list; raises InputError for one that cannot be."""
-    if record.get("overhangs") is None:
+def make_eaves(values: Mapping[str, Any], roof: Roof) -> Eaves | None:
+    """Make the overhangs, None without a list; raises InputError for one that cannot be."""
+    if values.get("overhangs") is None:
         return None
-    kind = record.get("footprint_kind", WALLS)
-    kinds = f"a footprint_kind of {WALLS} or {ROOF_EDGE}"
-    require_code(kind, (WALLS, ROOF_EDGE), kinds, "; choose one")
-    thickness = number(record.get("roof_thickness", 0.2), "roof_thickness")
-    if not 0.0 < thickness <= MOST_OVERHANG_M:
-        raise InputError(
-            f"expected a roof_thickness over 0 m and up to {MOST_OVERHANG_M:g} m, got {thickness:g}"
-        )
     count = len(list_outline_edges(roof.outline).starts)
-    overhangs = tuple(
-        read_overhang(item, f"overhang {k}", count)
-        for k, item in enumerate(list_at(record, "overhangs"))
-    )
-    return Eaves(overhangs, round_number(thickness, DIGITS), kind)
+    overhangs = []
+    for k, overhang in enumerate(values["overhangs"]):
+        edge, label = overhang["edge"], f" of overhang {k}"
+        if edge not in range(count):
+            raise InputError(
+                f"expected an edge from 0 to {count - 1}{label}, got {excerpt(edge)}; count "
+                "the edges of the outline"
+            )
+        length = check_overhang(overhang["length"], "length", label)
+        sigma = round_number(overhang.get("sigma", math.nan), DIGITS)
+        overhangs.append(Overhang(int(edge), length, sigma))
+    thickness = check_overhang(values.get("roof_thickness", 0.2), "roof_thickness")
+    return Eaves(tuple(overhangs), thickness, values.get("footprint_kind", WALLS))
 
 
-def read_overhang(record: Any, label: str, count: int) -> Overhang:
-    """Read an overhang at one of `count` edges."""
-    refuse_other_keys(record, "overhang", label)
-    edge = record.get("edge")
-    if not isinstance(edge, int) or not 0 <= edge < count:
+def check_overhang(value_m: float, name: str, label: str = "") -> float:
+    """Check a length or a thickness of an overhang."""
+    if not 0.0 < value_m <= MOST_OVERHANG_M:
         raise InputError(
-            f"expected an edge from 0 to {count - 1} of {label}, got {excerpt(edge)}; count the "
-            "edges of the outline"
+            f"expected a {name} over 0 m and up to {MOST_OVERHANG_M:g} m{label}, got {value_m:g}"
         )
-    length = number(record.get("length"), f"length of {label}")
-    if not 0.0 < length <= MOST_OVERHANG_M:
+    return round_number(value_m, DIGITS)
+
+
+def make_installation(values: Mapping[str, Any], label: str) -> Installation:
+    sizes = [values["parameters"].get(name, 0.0) for name in BOX_SIZES]
+    if len(values["parameters"]) != len(BOX_SIZES) or min(sizes) <= 0:
         raise InputError(
-            f"expected a length over 0 m and up to {MOST_OVERHANG_M:g} m of {label}, got {length:g}"
+            f"expected {', '.join(BOX_SIZES)} over 0 as the parameters of {label}, got "
+            f"{excerpt(values['parameters'])}"
         )
-    sigma = figure(record, "sigma")
-    return Overhang(edge, round_number(length, DIGITS), round_number(sigma, DIGITS))
+    position, kappa = read_position(values, label)
+    length, width, height = map(round_number, sizes)
+    return Installation(values["type"], length, width, height, kappa, position)
 
 
 BOX_SIZES = ("length", "width", "height")
-
-
-def read_installation(record: Any, label: str) -> Installation:
-    refuse_other_keys(record, "installation", label)
-    kind = record.get("type")
-    kinds = f"{CHIMNEY} or {ROOF_OBJECT} as the type of {label}"
-    require_code(kind, (CHIMNEY, ROOF_OBJECT), kinds)
-    sizes = numbers_by_name(record.get("parameters") or {}, f"the parameters of {label}")
-    if sorted(sizes) != sorted(BOX_SIZES) or min(sizes.values()) <= 0:
-        raise InputError(
-            f"expected {', '.join(BOX_SIZES)} over 0 as the parameters of {label}, got "
-            f"{excerpt(record.get('parameters'))}"
-        )
-    position, kappa = read_position(record, label)
-    length, width, height = (round_number(sizes[name]) for name in BOX_SIZES)
-    return Installation(str(kind), length, width, height, kappa, position)
 
 
 def build(parameters: Mapping[str, Any], compose: ComposeSettings | None = None) -> Building:
@@ -138,14 +111,14 @@ def build(parameters: Mapping[str, Any], compose: ComposeSettings | None = None)
     """
     if "id" not in require_mapping(parameters, "the building"):
         raise InputError("expected the id of the building, got none; give one")
-    building, roof = read_building(parameters)
+    values = read_object(parameters, "building")
+    building, roof = make_building(values)
     if roof is None:
         return building
-    underside = read_underside(parameters, building, roof)
-    result = with_model(building, roof, compose, underside)
-    items = list_at(parameters, "installations")
-    installations = tuple(read_installation(x, f"installation {k}") for k, x in enumerate(items))
-    eaves = read_eaves(parameters, roof)
+    result = with_model(building, roof, compose, make_underside(values, building, roof))
+    items = enumerate(values.get("installations", ()))
+    installations = tuple(make_installation(item, f"installation {k}") for k, item in items)
+    eaves = make_eaves(values, roof)
     if not installations and eaves is None:
         return result
     model = dataclasses.replace(result.model, installations=installations)

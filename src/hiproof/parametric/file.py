@@ -9,17 +9,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ..errors import InputError, SettingsError
-from ..read.crs import NAMED_UNITS, parse_crs
+from ..read.crs import parse_crs
 from ..read.models.cityjson import ESCAPED
 from ..read.models.damage import Damaged, excerpt, explain_unreadable, readable, refuse
-from ..read.plausible import is_place
 from ..settings import Settings
 from ..write.head import FileHead
 from ..write.parameters import VERSION
-from .record import read_update, require_code
+from .record import read_update, read_value
 
 HEAD_KEY = "hiproof_parameters"
 # This very object stands for a line that cannot be read.
@@ -94,39 +91,26 @@ def read_head(record: Any, path: str | os.PathLike[str]) -> FileHead:
     if not isinstance(record, dict) or HEAD_KEY not in record:
         raise InputError(
             f'expected {{"{HEAD_KEY}": {VERSION}, ...}} in the first line of {where}, got '
-            "something "
-            "else; "
-            "is it a parameters.jsonl that hiproof wrote?"
+            "something else; is it a parameters.jsonl that hiproof wrote?"
         )
     if record[HEAD_KEY] != VERSION:
         raise InputError(
             f"expected parameters of version {VERSION} in {where}, got version "
             f"{excerpt(record[HEAD_KEY])}; use the hiproof that wrote them, or reconstruct again"
         )
-    unit, offset = record.get("unit", "auto"), record.get("cityjson_offset")
-    units = f"a unit ({', '.join(NAMED_UNITS)}) in the head of {where}"
-    require_code(unit, NAMED_UNITS, units, "; choose one")
-    if offset is not None and not is_place(offset):
-        raise InputError(
-            f"expected three numbers as cityjson_offset of {where}, got {excerpt(offset)}; write "
-            "null for none"
-        )
     try:
         settings = Settings.from_dict(
             {name: record.get(name) or {} for name in ("compose", "write")}
         )
-        crs = parse_crs(record.get("crs"))
-        update = None if record.get("update") is None else read_update(record["update"])
+        crs, unit, offset, update = (
+            parse_crs(record.get("crs")),
+            read_value(record.get("unit", "auto"), "unit", "unit"),
+            read_value(record.get("cityjson_offset"), "place?", "cityjson_offset"),
+            None if record.get("update") is None else read_update(record["update"]),
+        )
     except (InputError, SettingsError) as error:
         raise InputError(f"{where}, in its head: {error!s:.400}") from error
-    return FileHead(
-        crs,
-        unit,
-        None if offset is None else np.array(offset, float),
-        settings.compose,
-        settings.write,
-        update=update,
-    )
+    return FileHead(crs, unit, offset, settings.compose, settings.write, update=update)
 
 
 def records(

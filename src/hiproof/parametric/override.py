@@ -29,7 +29,6 @@ from ..compose.readable import MOST_PARTS
 from ..errors import FitError, HiproofError, InputError
 from ..frames import LocalFrame
 from ..model import Building, Footprint, as_xyz
-from ..primitives.catalogue import CATALOGUE
 from ..read.models.damage import excerpt
 from ..read.plausible import HIGHEST_BUILDING_M, HIGHEST_LAND_M, LOWEST_LAND_M
 from ..settings import Settings
@@ -44,7 +43,7 @@ from ..write.attribute_list import TABLES
 from ..write.parameters import building_record, outline_record
 from .building import build
 from .edit import rebuild
-from .record import number, numbers_by_name, place, polygon, require_code, require_mapping
+from .record import number, numbers_by_name, place, polygon, read_value, require_mapping
 from .refit import measure_building
 
 SHAPING = ("type", "types", "ridge_height", "eave_height", "fixed")
@@ -119,9 +118,13 @@ def read_override(record: Mapping[str, Any]) -> Override:
         )
     refuse_contradictions(record, has_list, text)
     fixed = numbers_by_name(record.get("fixed", {}), f"fixed of {text}")
-    heights = {name: possible(record, name, text) for name in ("ridge_height", "eave_height")}
-    fixed |= {name: height for name, height in heights.items() if height is not None}
-    count = None if has_list else possible(record, "parts", text)
+    numbers = {
+        key: check_number(key, record[key], text)
+        for key in RANGES
+        if key in record and not (key == "parts" and has_list)
+    }
+    fixed |= {key: numbers[key] for key in ("ridge_height", "eave_height") if key in numbers}
+    count = numbers.get("parts")
     if count is not None and count != int(count):
         raise InputError(
             f"expected a whole number of parts from 1 in {text}, got {count:g}; or give a list of "
@@ -139,24 +142,22 @@ def read_override(record: Mapping[str, Any]) -> Override:
         origin=place(record["origin"], f"origin of {text}") if "origin" in record else None,
         outline=record.get("outline"),
         fixed=fixed,
-        z_ground=possible(record, "z_ground", text),
-        block_height=possible(record, "block_height", text),
+        z_ground=numbers.get("z_ground"),
+        block_height=numbers.get("block_height"),
         leave_out=bool(record.get("leave_out", False)),
         told=describe_override(record, has_list),
     )
 
 
-def possible(record: Mapping[str, Any], key: str, where: str) -> float | None:
-    """Return the number of `key`, None without one; InputError where no building has it."""
-    if key not in record:
-        return None
-    value, (lower, upper) = number(record[key], f"{key} of {where}"), RANGES[key]
-    if not lower <= value <= upper:
+def check_number(key: str, value: Any, where: str) -> float:
+    """Check the number of a key of RANGES; raises InputError where no building has it."""
+    result, (lower, upper) = number(value, f"{key} of {where}"), RANGES[key]
+    if not lower <= result <= upper:
         raise InputError(
-            f"expected {key} from {lower:g} to {upper:g} in {where}, got {value:g}; leave it out "
+            f"expected {key} from {lower:g} to {upper:g} in {where}, got {result:g}; leave it out "
             "where unknown"
         )
-    return value
+    return result
 
 
 def refuse_contradictions(record: Mapping[str, Any], has_list: bool, where: str) -> None:
@@ -186,17 +187,16 @@ def refuse_contradictions(record: Mapping[str, Any], has_list: bool, where: str)
 
 def read_types(record: Mapping[str, Any], where: str) -> tuple[str, ...]:
     """Read the types, commas between them, that parts may have, none without any."""
-    given_types = record.get("types")
+    given_types = record.get("types", ())
     names = given_types.split(",") if isinstance(given_types, str) else given_types
-    if names is not None and not (isinstance(names, (list, tuple)) and names):
+    if not isinstance(names, (list, tuple)) or ("types" in record and not names):
         raise InputError(
             f"expected a list of roof types as types of {where}, got {excerpt(given_types)}; name "
             "one at least"
         )
-    types = tuple(name.strip() if isinstance(name, str) else name for name in names or ())
+    types = tuple(name.strip() if isinstance(name, str) else name for name in names)
     for name in (*types, record.get("type", "flat")):
-        known = f"roof types ({', '.join(CATALOGUE)}) in {where}"
-        require_code(name, CATALOGUE, known, "; choose among these")
+        read_value(name, "roof_type", f"a type of {where}")
     if types and record.get("type", types[0]) not in types:
         raise InputError(
             f"expected the type among the types in {where}, got {record['type']!r}; keep one of "

@@ -1,9 +1,10 @@
-"""The JSON object of one building checked, in sentences that say where, and its parts made."""
+"""The JSON object of one building read by its declared types, and its parts made."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Mapping
+from dataclasses import fields
 from itertools import pairwise
 from typing import Any
 
@@ -24,10 +25,13 @@ from ..errors import InputError
 from ..frames import LocalFrame
 from ..geometry.rings import intersect, repair_polygons
 from ..model import Building, Part, Quality, Roof
+from ..model.installation import CHIMNEY, ROOF_OBJECT
+from ..model.overhang import ROOF_EDGE, WALLS
 from ..primitives.catalogue import CATALOGUE
 from ..primitives.parameters import refuse_no_shape
+from ..read.crs import NAMED_UNITS
 from ..read.models.damage import excerpt
-from ..status import Change, Grade, Status
+from ..status import Change, ChangeKind, Grade, Status
 from ..write.attribute_list import TABLES
 from ..write.head import UpdateHead
 
@@ -36,8 +40,67 @@ WIDEST_PART_M = 1e5  # of any number of a part, and of heights
 FARTHEST_WORLD_M = 1e8
 LARGEST_NUMBER = 1e15  # at which float64 still holds eighths; larger is no number of a building
 FAR_M, SLACK_M = 1e4, 0.01  # how far a saw-tooth's outline may reach into the next tooth
-FIGURES = ("density", "nodata_share", "unexplained_area_m2")
-RESIDUALS = ("psd_mean", "psd_std", "rmse", "p95", "share_within_20cm", "outline_iou")
+FIGURES = tuple(field.name for field in fields(Quality) if field.name != "points")
+# The values of each type that has a few of them, and what a sentence calls one.
+CHOICES: dict[str, tuple[str, Collection[str]]] = {
+    "unit": ("a unit", NAMED_UNITS),
+    "status": ("a status", [status.code for status in Status]),
+    "grade": ("a quality", [grade.code for grade in Grade]),
+    "change_class": ("a class of change", [change.code for change in Change]),
+    "change_kind": ("a kind of change", [kind.code for kind in ChangeKind]),
+    "roof_type": ("a roof type", CATALOGUE),
+    "installation_type": ("a kind of installation", (CHIMNEY, ROOF_OBJECT)),
+    "walls": ("a kind of walls", ("level", "terrain")),
+    "footprint_kind": ("a kind of footprint", (WALLS, ROOF_EDGE)),
+}
+# What a sentence calls an object of a list; the others are called as their tables are.
+LISTED = {
+    "change_place": "place {} of the change",
+    "ended_model": "model {} of the history",
+    "roof_outside": "roof {} of roofs_outside",
+}
+
+
+def read_object(value: Any, table: str, label: str = "") -> dict[str, Any]:
+    """Read an object by the types that its table declares, InputError for what is of no such.
+
+    What is left out stays out, unless the table requires it. `label` is what a sentence calls the
+    object, empty for one that stands by itself.
+    """
+    record, names = require_mapping(value, label or f"the {table}"), TABLES[table].names
+    other = [str(key)[:40] for key in record if key not in names]
+    if other:
+        raise InputError(
+            f"expected the keys {', '.join(names)} of {label or f'the {table}'}, got also "
+            f"{', '.join(other[:8])}; remove them"
+        )
+    return {
+        name: read_value(record.get(name), type, f"the {name} of {label}" if label else name)
+        for name, _, _, _, type in TABLES[table].attributes
+        if name in record or name in TABLES[table].required
+    }
+
+
+def read_value(value: Any, type: str, label: str) -> Any:
+    """Read a value of a type as data/attributes.toml names it."""
+    if type in READERS:
+        return READERS[type](value, label)
+    if type.endswith("?"):
+        return None if value is None else read_value(value, type[:-1], label)
+    if type.endswith("[]"):
+        item = type[:-2]
+        called = LISTED.get(item, f"{item} {{}}") if item in TABLES else label
+        items = enumerate(as_list([] if value is None else value, label))
+        return [read_value(inner, item, called.format(k)) for k, inner in items]
+    if type in CHOICES:
+        kind, choices = CHOICES[type]
+        if not isinstance(value, str) or value not in choices:
+            raise InputError(
+                f"expected {kind} ({', '.join(choices)}) as {label}, got {excerpt(value)}; choose "
+                "one"
+            )
+        return value
+    return read_object(value, type, label)
 
 
 def read_building(record: Mapping[str, Any]) -> tuple[Building, Roof | None]:
@@ -46,53 +109,54 @@ def read_building(record: Mapping[str, Any]) -> tuple[Building, Roof | None]:
     The roof is made of its parts, None where it has none. Raises InputError, one sentence, for an
     object that makes none.
     """
-    refuse_other_keys(record, "building", "the building")
-    parts = list_at(record, "parts")
-    origin = None if record.get("origin") is None else place(record["origin"], "origin", coordinate)
-    outline = None if record.get("outline") is None else polygon(record["outline"], "outline")
-    status = read_status(record, bool(parts))
-    roof = read_roof(parts, outline, origin) if parts else None
-    world = outline if roof is None else roof.world_outline
-    ground = (
-        figure(record, "z_ground") if roof is None else measure(record.get("z_ground"), "z_ground")
-    )
-    code, by_code = text_at(record, "quality"), {grade.code: grade for grade in Grade}
-    if code:
-        require_code(code, by_code, f"a quality ({', '.join(by_code)})", AS_WRITTEN)
+    return make_building(read_object(record, "building"))
+
+
+def make_building(values: Mapping[str, Any]) -> tuple[Building, Roof | None]:
+    """Make the building of values that were read, and its roof, as `read_building` does."""
+    status, parts, outline = choose_status(values), values.get("parts"), values.get("outline")
+    roof = make_roof(parts, outline, values.get("origin")) if parts else None
+    ground = values.get("z_ground", math.nan)
+    if roof is not None:
+        ground = measure(None if math.isnan(ground) else ground, "z_ground")
+    figures = {**values, **values.get("residuals", {})}
+    grades = {grade.code: grade for grade in Grade}
     building = Building(
-        id=str(record["id"]),
+        id=str(values["id"]),
         status=status,
-        detail=text_at(record, "detail") if status.code == record.get("status") else "",
-        quality=read_quality(record),
-        grade=by_code.get(code),
+        detail=values.get("detail", "") if status.code == values.get("status") else "",
+        quality=Quality(
+            points=int(values.get("points", 0)),
+            **{name: figures.get(name, math.nan) for name in FIGURES},
+        ),
+        grade=grades.get(values.get("quality", "")),
         z_ground=round_number(ground, PLAN_DIGITS),
-        ground_source=text_at(record, "ground_source"),
-        terrain_intersection=tuple(read_terrain_lines(record)),
-        objective=figure(record, "objective"),
-        recognised=numbers_by_name(record.get("recognised") or {}, "recognised"),
-        types=numbers_by_name(record.get("types") or {}, "types"),
-        footprint=world,
-        attributes=dict(require_mapping(record.get("attributes") or {}, "attributes")),
-        shift=read_shift(record),
-        change=read_change(record),
-        survey_date=text_at(record, "survey_date"),
-        epochs_used=tuple(map(str, list_at(record, "epochs_used"))),
+        ground_source=values.get("ground_source", ""),
+        terrain_intersection=tuple(values.get("terrain_line", ())),
+        objective=values.get("objective", math.nan),
+        recognised=values.get("recognised", {}),
+        types=values.get("types", {}),
+        footprint=outline if roof is None else roof.world_outline,
+        attributes=dict(values.get("attributes", {})),
+        shift=values.get("shift", (0.0, 0.0)),
+        change=values.get("change"),
+        survey_date=values.get("survey_date", ""),
+        epochs_used=tuple(values.get("epochs_used", ())),
     )
     return building, roof
 
 
-def read_status(record: Mapping[str, Any], has_parts: bool) -> Status:
-    """Read the status; a building with parts by hand has that of a model."""
-    code = record.get("status", Status.MODELLED.code if has_parts else Status.NO_POINTS.code)
-    by_code = {status.code: status for status in Status}
-    require_code(code, by_code, f"a status ({', '.join(by_code)})", AS_WRITTEN)
-    if has_parts and not by_code[code].is_model:
-        return Status.MODELLED
-    if not has_parts and by_code[code].is_model:
+def choose_status(values: Mapping[str, Any]) -> Status:
+    """Return the status; a building with parts by hand has that of a model."""
+    status = next((one for one in Status if one.code == values.get("status")), None)
+    if values.get("parts"):
+        return status if status is not None and status.is_model else Status.MODELLED
+    if status is not None and status.is_model:
         raise InputError(
-            f"expected parts of a building whose status is {code}, got none; give one part at least"
+            f"expected parts of a building whose status is {status.code}, got none; give one part "
+            "at least"
         )
-    return by_code[code]
+    return status or Status.NO_POINTS
 
 
 def read_outline(record: Mapping[str, Any]) -> shapely.Polygon | None:
@@ -114,7 +178,9 @@ def on_grid(outline: shapely.Polygon) -> shapely.Polygon:
         ) from error
 
 
-def read_roof(parts: list[Any], outline: shapely.Polygon | None, origin: np.ndarray | None) -> Roof:
+def make_roof(
+    parts: list[dict[str, Any]], outline: shapely.Polygon | None, origin: np.ndarray | None
+) -> Roof:
     """Return the roof of a building's parts over its outline, about its origin."""
     if outline is None or origin is None:
         raise InputError(
@@ -122,57 +188,53 @@ def read_roof(parts: list[Any], outline: shapely.Polygon | None, origin: np.ndar
         )
     refuse_many(parts)
     outline = on_grid(outline)
-    created = [read_part(part, outline, f"part {index}") for index, part in enumerate(parts)]
+    created = [make_part(part, outline, f"part {index}") for index, part in enumerate(parts)]
     roof = Roof(tuple(created), outline, LocalFrame(round_values(origin, DIGITS)))
     refuse_wrong_parts(roof)
     return roof
 
 
-def read_part(record: Any, outline: shapely.Polygon, label: str) -> Part:
-    """Read a part with its planes, over the building's outline if it has none of its own."""
-    refuse_other_keys(record, "part", label)
-    kind = text_at(record, "type")
-    parameters = numbers_by_name(record.get("parameters") or {}, f"the parameters of {label}")
-    refuse_no_shape(kind, parameters, label)
-    parameters = {name: round_number(value) for name, value in parameters.items()}
-    position, kappa = read_position(record, label)
-    outlines = read_part_outlines(record, parameters, position, kappa, outline, label)
+def make_part(values: Mapping[str, Any], outline: shapely.Polygon, label: str) -> Part:
+    """Make a part with its planes, over the building's outline if it has none of its own."""
+    kind = values["type"]
+    refuse_no_shape(kind, values["parameters"], label)
+    parameters = {name: round_number(value) for name, value in values["parameters"].items()}
+    position, kappa = read_position(values, label)
+    outlines = values.get("outlines")
+    if outlines is None:
+        outlines = cut_plan(kind, parameters, position, kappa, outline, label)
     if kind == "shed":
         outlines = by_teeth(outlines, parameters, position, kappa)
     outlines = [rounded_outline(o) for o in outlines]
     pieces = make_pieces(kind, parameters, kappa, position, outlines)
-    sigma = numbers_by_name(record.get("sigma") or {}, f"the standard deviations of {label}")
     sigma = {
         ("kappa" if n == "rotation" else n): (math.radians(s) if n == "rotation" else s)
-        for n, s in sigma.items()
+        for n, s in values.get("sigma", {}).items()
     }
     return Part(kind, pieces, parameters, kappa, position, settled_sigma(sigma))
 
 
-def read_position(record: Mapping[str, Any], label: str) -> tuple[np.ndarray, float]:
+def read_position(values: Mapping[str, Any], label: str) -> tuple[np.ndarray, float]:
     """Read where a part or an installation lies (3,) about the origin, and its rotation in rad."""
-    position = place(record.get("position"), f"position of {label}", measure)
-    rotation = number(record.get("rotation", 0.0), f"rotation of {label}")
-    return round_values(position, DIGITS), math.radians(round_number(rotation))
+    position = np.array([measure(value, f"position of {label}") for value in values["position"]])
+    return round_values(position, DIGITS), math.radians(round_number(values.get("rotation", 0.0)))
 
 
-def read_part_outlines(
-    record: Mapping[str, Any],
+def cut_plan(
+    kind: str,
     parameters: Mapping[str, float],
     position: np.ndarray,
     kappa: float,
     outline: shapely.Polygon,
     label: str,
 ) -> list[shapely.Polygon]:
-    """Return the outlines given of a part, else what its plan covers of the building's outline."""
-    if record.get("outlines") is not None:
-        return [polygon(rings, f"an outline of {label}") for rings in list_at(record, "outlines")]
+    """Return what the plan of a part covers of the building's outline."""
     if "width" not in parameters or "length" not in parameters:
         raise InputError(
             f"expected width and length, or outlines, of {label}, got neither; give the rectangle"
         )
     half = 0.5 * np.array([parameters["length"], parameters["width"]])
-    rim = np.array(CATALOGUE[record["type"]].variant(parameters).rim) * half
+    rim = np.array(CATALOGUE[kind].variant(parameters).rim) * half
     return clip(place_plan(rim, position, kappa), outline)
 
 
@@ -215,10 +277,15 @@ def by_teeth(
 
 
 def read_terrain_lines(record: Mapping[str, Any]) -> list[np.ndarray]:
-    """Read the terrain's lines (m, 3) along the outline."""
+    """Read the terrain's lines (m, 3) along the outline of a building's object."""
+    return read_lines(record.get("terrain_line"), "terrain_line")
+
+
+def read_lines(value: Any, label: str) -> list[np.ndarray]:
+    """Read lines (m, 3), none where there are none."""
     lines = [
-        read_places(as_list(line, "a line of terrain_line"), "a point of terrain_line")
-        for line in as_list(record.get("terrain_line") or [], "terrain_line")
+        read_places(as_list(line, f"a line of {label}"), f"a point of {label}")
+        for line in as_list(value or [], label)
     ]
     return [round_values(line, PLAN_DIGITS) for line in lines if len(line)]
 
@@ -235,123 +302,38 @@ def read_places(rows: list[Any], label: str) -> np.ndarray:
 
 
 def read_change(record: Mapping[str, Any]) -> dict[str, Any] | None:
-    """Read what the last update found, None where there is nothing."""
-    if record.get("change") is None:
-        return None
-    code = require_mapping(record["change"], "the change").get("class")
-    codes = [change.code for change in Change]
-    as_written = "; leave it as the update wrote it"
-    require_code(code, codes, f"a class of change ({', '.join(codes)})", as_written)
-    change = require_values(record["change"], "change", "the change")
-    lists = ("places", "lineage", "predecessors", "history")
-    values = {**change, **{name: list_at(change, name) for name in lists}}
-    names = TABLES["change"].names
-    return {name: values.get(name) for name in names if name != "history" or values[name]}
+    """Read what the last update found of a building, None where there is nothing."""
+    change = record.get("change")
+    return None if change is None else check_change(change, "change")
+
+
+def check_change(change: Any, label: str) -> dict[str, Any]:
+    """Check what an update found of a building, which is kept as it is written."""
+    values = read_object(change, "change")
+    for k, place in enumerate(values.get("places", ())):
+        if len(place.get("parts", ())) not in (0, 2):
+            raise InputError(
+                f"expected the earlier and the new part of {LISTED['change_place'].format(k)}, got "
+                f"{excerpt(place['parts'])}; write null for none"
+            )
+    names, lists = TABLES["change"].names, ("places", "lineage", "predecessors", "history")
+    kept = {**change, **{name: list_at(change, name) for name in lists}}
+    return {name: kept.get(name) for name in names if name != "history" or kept[name]}
 
 
 def read_update(record: Any) -> UpdateHead:
     """Read what an update found beside its buildings."""
-    update, names = require_values(record, "update", "update"), TABLES["roof_outside"].names
-    roofs = [{name: roof.get(name) for name in names} for roof in list_at(update, "roofs_outside")]
-    return UpdateHead(text_at(update, "survey"), tuple(roofs))
-
-
-# What a sentence calls one of the objects of a list.
-LISTED = {
-    "change_place": "place {} of the change",
-    "ended_model": "model {} of the history",
-    "roof_outside": "roof {} of roofs_outside",
-}
-
-
-def require_values(record: Any, table: str, label: str) -> Mapping[str, Any]:
-    """Check an object that is kept as it is, with the keys and types of a table."""
-    refuse_other_keys(record, table, label)
-    refuse_other_types(record, table, label)
-    return record
-
-
-def refuse_other_types(record: Mapping[str, Any], table: str, label: str = "") -> None:
-    """Raise InputError where values are not of the types that the table declares for them."""
-    if table == "roof_outside":
-        number(record.get("area"), f"area of {label}")
-    for attribute in TABLES[table].attributes:
-        name, type, value = attribute.name, attribute.type, record.get(attribute.name)
-        if attribute.kind == "text":
-            text_at(record, name)
-        elif type.endswith("[]"):
-            for k, item in enumerate(list_at(record, name)):
-                if type == "polygon[]":
-                    polygon(item, f"an outline of {label}")
-                elif type[:-2] in LISTED:
-                    require_values(item, type[:-2], LISTED[type[:-2]].format(k))
-        elif type == "shares":
-            numbers_by_name(value or {}, name)
-        elif type == "number":
-            measure(value, f"{name} of {label}")
-        elif type == "polygon":
-            polygon(value, f"the {name} of {label}")
-        elif value is not None:
-            if type == "number?":
-                number(value, name)
-            elif type == "place?":
-                place(value, name, coordinate)
-            elif type == "polygon?":
-                polygon(value, name)
-    if table == "change_place" and len(list_at(record, "parts")) not in (0, 2):
-        raise InputError(
-            f"expected the earlier and the new part of {label}, got {excerpt(record['parts'])}; "
-            "write null for none"
-        )
-
-
-def read_quality(record: Mapping[str, Any]) -> Quality:
-    """Read the figures that were measured at the reconstruction."""
-    residuals = require_mapping(record.get("residuals") or {}, "residuals")
-    figures = {name: figure(residuals, name) for name in RESIDUALS} | {
-        name: figure(record, name) for name in FIGURES
-    }
-    points = number(record.get("points", 0), "points")
-    return Quality(points=int(points), **figures)
+    update, names = read_object(record, "update"), TABLES["roof_outside"].names
+    roofs = list_at(record, "roofs_outside")
+    for k, roof in enumerate(roofs):
+        number(roof["area"], f"the area of {LISTED['roof_outside'].format(k)}")
+    outside = ({name: roof.get(name) for name in names} for roof in roofs)
+    return UpdateHead(update["survey"], tuple(outside))
 
 
 def refuse_other_kinds(record: Mapping[str, Any]) -> None:
-    """Raise InputError where a value is of another kind than a run writes, without geometry."""
-    parts = [
-        require_mapping(part, f"part {index}")
-        for index, part in enumerate(list_at(record, "parts"))
-    ]
-    read_status(record, bool(parts))
-    refuse_other_types(record, "building")
-    read_quality(record)
-    for index, part in enumerate(parts):
-        label = f"part {index}"
-        require_code(
-            text_at(part, "type"), CATALOGUE, f"a roof type ({', '.join(CATALOGUE)}) in {label}"
-        )
-        read_position(part, label)
-        for name in ("parameters", "sigma"):
-            numbers_by_name(part.get(name) or {}, f"{name} of {label}")
-
-
-def refuse_other_keys(record: Any, table: str, label: str) -> None:
-    """Raise InputError for what is no object, or has keys that a table does not declare."""
-    allowed = TABLES[table].names
-    other = [str(key)[:40] for key in require_mapping(record, label) if key not in allowed]
-    if other:
-        raise InputError(
-            f"expected the keys {', '.join(allowed)} of {label}, got also {', '.join(other[:8])}; "
-            "remove them"
-        )
-
-
-AS_WRITTEN = "; leave it as the run wrote it"
-
-
-def require_code(value: Any, codes: Collection[str], expected: str, advice: str = "") -> None:
-    """Raise InputError for what is none of the `codes`, which `expected` names."""
-    if not isinstance(value, str) or value not in codes:
-        raise InputError(f"expected {expected}, got {excerpt(value)}{advice}")
+    """Raise InputError where a value is of another kind than a run writes."""
+    choose_status(read_object(record, "building"))
 
 
 def require_mapping(value: Any, label: str) -> Mapping[str, Any]:
@@ -371,9 +353,12 @@ def list_at(record: Mapping[str, Any], name: str) -> list[Any]:
 
 
 def text_at(record: Mapping[str, Any], name: str) -> str:
-    value = record.get(name)
+    return read_text(record.get(name), name)
+
+
+def read_text(value: Any, label: str) -> str:
     if not (value is None or isinstance(value, str)):
-        raise InputError(f"expected text as {name}, got {excerpt(value)}; put it in quotes")
+        raise InputError(f"expected text as {label}, got {excerpt(value)}; put it in quotes")
     return value or ""
 
 
@@ -418,33 +403,43 @@ def round_values(values: np.ndarray, digits: int) -> np.ndarray:
     return np.array([round_number(v, digits) for v in values.ravel()]).reshape(values.shape)
 
 
-def figure(record: Mapping[str, Any], name: str) -> float:
-    """Read a number, NaN where it is null or left out."""
-    return math.nan if record.get(name) is None else number(record[name], name)
+def read_figure(value: Any, label: str) -> float:
+    """Read a number, NaN where it is null."""
+    return math.nan if value is None else number(value, label)
 
 
 def numbers_by_name(values: Any, label: str) -> dict[str, float]:
     return {
         str(name): measure(value, f"{name} in {label}")
-        for name, value in require_mapping(values, label).items()
+        for name, value in require_mapping(values or {}, label).items()
     }
+
+
+def read_figures(values: Any, label: str) -> dict[str, float]:
+    mapping = require_mapping(values or {}, label)
+    return {name: read_figure(value, name) for name, value in mapping.items()}
 
 
 def read_shift(record: Mapping[str, Any]) -> tuple[float, float]:
     """Read how far the footprint was moved; one made by hand was not."""
-    value = record.get("shift", [0.0, 0.0])
+    return read_pair(record.get("shift", [0.0, 0.0]), "shift")
+
+
+def read_pair(value: Any, label: str) -> tuple[float, float]:
     if not isinstance(value, list) or len(value) != 2:
-        raise InputError(f"expected two numbers [x, y] as shift, got {excerpt(value)}; give metres")
-    return number(value[0], "shift"), number(value[1], "shift")
+        raise InputError(
+            f"expected two numbers [x, y] as {label}, got {excerpt(value)}; give metres"
+        )
+    return number(value[0], label), number(value[1], label)
 
 
-def place(value: Any, label: str, read: Callable[[Any, str], float] = number) -> np.ndarray:
-    """Read three numbers (3,), each by `read`."""
+def place(value: Any, label: str) -> np.ndarray:
+    """Read three coordinates (3,)."""
     if not isinstance(value, list) or len(value) != 3:
         raise InputError(
             f"expected three numbers [x, y, z] as {label}, got {excerpt(value)}; give metres"
         )
-    return np.array([read(v, label) for v in value])
+    return np.array([coordinate(v, label) for v in value])
 
 
 def polygon(rings: Any, label: str) -> shapely.Polygon:
@@ -463,3 +458,20 @@ def polygon(rings: Any, label: str) -> shapely.Polygon:
             f"expected rings, the outer first, as {label}, got none; write null for no outline"
         )
     return shapely.Polygon(result[0], result[1:])
+
+
+# How values of a type are read; all others are lists, choices and objects of a table.
+READERS: dict[str, Callable[[Any, str], Any]] = {
+    **dict.fromkeys(("text", "text?"), read_text),
+    **dict.fromkeys(("parameters", "box", "numbers", "shares"), numbers_by_name),
+    **dict.fromkeys(("integer", "length", "natural"), number),
+    "number": measure,
+    "number?": read_figure,
+    "figures": read_figures,
+    "pair": read_pair,
+    "place": place,
+    "polygon": polygon,
+    "place[][]": read_lines,
+    "object": lambda value, label: require_mapping(value or {}, label),
+    "change": lambda value, label: None if value is None else check_change(value, label),
+}

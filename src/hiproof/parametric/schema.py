@@ -5,30 +5,16 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from ..model.installation import CHIMNEY, ROOF_OBJECT
-from ..model.overhang import ROOF_EDGE, WALLS
 from ..primitives.cants import MEASURES, MOST_CANTS
 from ..primitives.catalogue import CATALOGUE
-from ..read.crs import NAMED_UNITS
-from ..status import Change, ChangeKind, Grade, Status
 from ..write.attribute_list import DECLARED, TABLES
+from .record import CHOICES
 
 RECORDS = (
     *("head", "update", "roof_outside", "building", "part", "passage", "installation"),
     *("overhang", "change", "ended_model", "change_place"),
 )
 TYPE_SCHEMAS: dict[str, dict[str, Any]] = DECLARED["schemas"]
-CHOICES: dict[str, Any] = {
-    "unit": NAMED_UNITS,
-    "status": [status.code for status in Status],
-    "grade": [grade.code for grade in Grade],
-    "change_class": [change.code for change in Change],
-    "change_kind": [kind.code for kind in ChangeKind],
-    "roof_type": CATALOGUE,
-    "installation_type": (CHIMNEY, ROOF_OBJECT),
-    "walls": ("level", "terrain"),
-    "footprint_kind": (WALLS, ROOF_EDGE),
-}
 
 
 def schema() -> dict[str, Any]:
@@ -81,7 +67,7 @@ def describe_type(type: str) -> dict[str, Any]:
             return {"type": [described["type"], "null"]}
         return {"anyOf": [described, {"type": "null"}]}
     if type in CHOICES:
-        return {"enum": list(CHOICES[type])}
+        return {"enum": list(CHOICES[type][1])}
     return {"$ref": f"#/$defs/{type}"} if type in RECORDS else TYPE_SCHEMAS[type]
 
 

@@ -21,7 +21,7 @@ from ...masking import mask
 from ...model import Footprint
 from ...parametric.fallback import find_fallback_ranges, list_fallback_columns
 from ...parametric.file import HEAD_KEY, objects
-from ...parametric.override import KEYS, RANGES, Override, read_override
+from ...parametric.override import KEYS, RANGES, Override, check_number, read_override
 from ...read.models.damage import explain_unreadable
 from ...read.numbers import (
     FIRST_YEAR,
@@ -307,10 +307,12 @@ def select_possible(record: Mapping[str, Any], id: str, skipped: SkippedValues) 
         value = convert_value(key, cell)
         if is_empty(value):
             continue
-        if is_possible(key, value):
+        try:
+            if key in RANGES and not isinstance(value, list):
+                check_number(key, value, id)
             result[key] = value
-        else:
-            lower, upper = RANGES.get(key, (0.0, 0.0))
+        except InputError:
+            lower, upper = RANGES[key]
             skipped.note(f"{key} from {lower:g} to {upper:g}", value, id)
     return result
 
@@ -327,19 +329,3 @@ def convert_value(key: str, value: Any) -> Any:
         number = read_number(value)
         return value if number is None else number
     return str(value) if key == "id" else value
-
-
-def is_possible(key: str, value: Any) -> bool:
-    """Return whether a building can have the value.
-
-    It is a number within the key's range; other keys have none.
-
-    >>> is_possible("z_ground", -9999), is_possible("parts", 0), is_possible("parts",
-    ...     [{}]), is_possible("note", -9999)
-    (False, False, True, True)
-    """
-    bounds = RANGES.get(key)
-    if bounds is None or (key == "parts" and isinstance(value, list)):
-        return True
-    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    return is_number and bounds[0] <= value <= bounds[1]
