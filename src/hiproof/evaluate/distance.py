@@ -1,4 +1,4 @@
-"""Exact distances from points to bounded planar polygons.
+"""Exact distances from points to bounded planar polygons. Compiled.
 
 All residual figures build on them.
 
@@ -13,16 +13,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import shapely
 
+from ..compiled import compiled
 from ..errors import InputError
-from ..geometry.point_in_polygon import find_inside
-from ..geometry.rings import ring_normal
+from ..geometry.flat_shell import FlatShell
+from ..geometry.point_in_polygon import flips
 from ..model import as_xyz
 
 # (m, 3) vertices without the closing one; a polygon is a ring or a sequence of rings, the outer
 # first, holes after.
 Ring = np.ndarray
+
+LEAST_AREA_M2 = 1e-12  # A polygon with less area counts as its edges.
+UPRIGHT = 1e-6  # The upward part of the normal of a polygon that is upright.
 
 
 def point_surface_distances(
@@ -37,23 +40,8 @@ def point_surface_distances(
     >>> point_surface_distances(np.array([[1.0, 1, 3], [5, 1, 4]]), [square]).tolist()
     [3.0, 5.0]
     """
-    points = as_xyz(points)
-    nearest = np.full(len(points), np.inf)
-    for rings in list_polygons(polygons):
-        normal, origin, near = *fit_ring_plane(rings[0]), np.arange(len(points))
-        if normal.any():
-            heights = (points - origin) @ normal
-            near = np.flatnonzero(np.abs(heights) < nearest)
-            heights = heights[near]
-            feet = points[near] - heights[:, None] * normal
-            kept = np.arange(3) != np.abs(normal).argmax()
-            inside = contains(rings, kept, feet)
-            nearest[near[inside]] = np.abs(heights[inside])
-            near = near[~inside]
-        for ring in rings:
-            for start, end in zip(ring, np.roll(ring, -1, axis=0), strict=True):
-                nearest[near] = np.minimum(nearest[near], edge_distance(points[near], start, end))
-    return nearest
+    points = np.ascontiguousarray(as_xyz(points))
+    return measure_distances(points, *list_faces(polygons))
 
 
 def vertical_distances(points: np.ndarray, polygons: Sequence[Ring | Sequence[Ring]]) -> np.ndarray:
@@ -65,49 +53,92 @@ def vertical_distances(points: np.ndarray, polygons: Sequence[Ring | Sequence[Ri
     >>> vertical_distances(np.array([[1.0, 1, 3], [5, 1, 4]]), [square]).tolist()
     [2.0, inf]
     """
-    points = as_xyz(points)
+    points = np.ascontiguousarray(as_xyz(points))
+    return measure_gaps(points, *list_faces(polygons))
+
+
+def list_faces(polygons: Sequence[Ring | Sequence[Ring]]) -> tuple[np.ndarray, ...]:
+    """Return the edges of all polygons, from and to (m, 3), their starts, and unit normals (f, 3).
+
+    A normal is zero without area. Raises InputError for arrays of another shape.
+    """
+    rings, counts = [], [0]
+    for polygon in polygons:
+        single = isinstance(polygon, np.ndarray) and polygon.ndim == 2
+        rings += [np.asarray(ring, float) for ring in ((polygon,) if single else polygon)]
+        counts.append(len(rings))
+    for ring in rings:
+        if ring.ndim != 2 or ring.shape[1] != 3 or len(ring) < 3:
+            raise InputError(
+                f"expected rings of shape (m, 3) with at least 3 vertices, got {ring.shape}"
+            )
+    vertices = np.concatenate([np.zeros((0, 3)), *rings])
+    ring_start = np.cumsum([0, *map(len, rings)])
+    shell = FlatShell(vertices, np.arange(len(vertices)), ring_start, np.array(counts))
+    normals = shell.areas[shell.face_start[:-1]]
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    is_flat = length >= LEAST_AREA_M2
+    normals = np.where(is_flat, normals / np.where(is_flat, length, 1.0), 0.0)
+    return vertices, vertices[shell.after], ring_start[shell.face_start], normals
+
+
+@compiled
+def measure_distances(points, starts, ends, first, normals):
+    """Return the distance (n,) of points (n, 3) to the nearest face, those of `list_faces`."""
     nearest = np.full(len(points), np.inf)
-    for rings in list_polygons(polygons):
-        normal, origin = fit_ring_plane(rings[0])
-        if abs(normal[2]) < 1e-6:
-            continue
-        gaps = np.abs((points - origin) @ normal / normal[2])
-        near = np.flatnonzero(gaps < nearest)
-        near = near[contains(rings, np.array([True, True, False]), points[near])]
-        nearest[near] = gaps[near]
+    for f in range(len(normals)):
+        a, b, c = normals[f]
+        origin = starts[first[f]]
+        for i in range(len(points)):
+            x, y, z = points[i]
+            height = a * (x - origin[0]) + b * (y - origin[1]) + c * (z - origin[2])
+            if abs(height) >= nearest[i]:
+                continue
+            foot = (x - height * a, y - height * b, z - height * c)
+            if holds(foot, starts, ends, first, f, np.argmax(np.abs(normals[f]))):
+                nearest[i] = abs(height)
+                continue
+            for k in range(first[f], first[f + 1]):
+                nearest[i] = min(nearest[i], measure_edge(points[i], starts[k], ends[k]))
     return nearest
 
 
-def list_polygons(polygons: Sequence[Ring | Sequence[Ring]]) -> list[list[np.ndarray]]:
-    """Return the rings of each polygon. Raises InputError for arrays of another shape."""
-    result = []
-    for polygon in polygons:
-        single = isinstance(polygon, np.ndarray) and polygon.ndim == 2
-        rings = [np.asarray(ring, float) for ring in ((polygon,) if single else polygon)]
-        for ring in rings:
-            if ring.ndim != 2 or ring.shape[1] != 3 or len(ring) < 3:
-                raise InputError(
-                    f"expected rings of shape (m, 3) with at least 3 vertices, got {ring.shape}"
-                )
-        result.append(rings)
-    return result
+@compiled
+def measure_gaps(points, starts, ends, first, normals):
+    """Return the least |dz| (n,) of points (n, 3) to faces over or under them."""
+    nearest = np.full(len(points), np.inf)
+    for f in range(len(normals)):
+        a, b, c = normals[f]
+        origin = starts[first[f]]
+        if abs(c) < UPRIGHT:
+            continue
+        for i in range(len(points)):
+            x, y, z = points[i]
+            gap = abs((a * (x - origin[0]) + b * (y - origin[1])) / c + z - origin[2])
+            if gap < nearest[i] and holds((x, y, z), starts, ends, first, f, 2):
+                nearest[i] = gap
+    return nearest
 
 
-def fit_ring_plane(ring: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return unit normal (Newell, zero without area) and centroid of a ring."""
-    normal = ring_normal(ring)
-    length = np.linalg.norm(normal)
-    return (normal / length if length >= 1e-12 else np.zeros(3)), ring.mean(axis=0)
+@compiled
+def holds(place, starts, ends, first, f, axis):
+    """Return whether face f holds a place, seen along an axis. It has an area there."""
+    u, v = (axis + 1) % 3, (axis + 2) % 3
+    inside = False
+    for k in range(first[f], first[f + 1]):
+        inside ^= flips(starts[k, u], starts[k, v], ends[k, u], ends[k, v], place[u], place[v])
+    return inside
 
 
-def contains(rings: list[np.ndarray], kept: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Return whether points (n, 3) lie in a polygon with holes, seen along the dropped axis."""
-    outer, *holes = (ring[:, kept] for ring in rings)
-    return find_inside(shapely.Polygon(outer, holes), *points[:, kept].T)
-
-
-def edge_distance(points: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """Return the distance of points (n, 3) to an edge."""
-    along, off = end - start, points - start
-    share = np.clip(off @ along / max(float(along @ along), np.finfo(float).tiny), 0.0, 1.0)
-    return np.linalg.norm(off - share[:, None] * along, axis=1)
+@compiled
+def measure_edge(point, start, end):
+    """Return the distance of a point (3,) to the edge between two."""
+    dot, length2 = 0.0, 0.0
+    for q in range(3):
+        dot += (point[q] - start[q]) * (end[q] - start[q])
+        length2 += (end[q] - start[q]) ** 2
+    share = min(max(dot / length2, 0.0), 1.0) if length2 > 0.0 else 0.0
+    distance2 = 0.0
+    for q in range(3):
+        distance2 += (point[q] - start[q] - share * (end[q] - start[q])) ** 2
+    return np.sqrt(distance2)
