@@ -73,12 +73,13 @@ def lies_on_wall(site, edge):
 @compiled
 def is_inside(site, x, y):
     """Return whether a place lies in a convex part of the outline."""
-    for part in range(len(site.part_sizes)):
-        box, ring, size = site.part_boxes[part], site.parts[part], site.part_sizes[part]
-        inside = box[0] <= x <= box[1] and box[2] <= y <= box[3]
-        x0, y0 = ring[size - 1, 0], ring[size - 1, 1]
-        for i in range(size if inside else 0):
-            x1, y1 = ring[i, 0], ring[i, 1]
+    boxes, rings, sizes = site.part_boxes, site.parts, site.part_sizes
+    for part in range(len(sizes)):
+        inside = boxes[part, 0] <= x <= boxes[part, 1] and boxes[part, 2] <= y <= boxes[part, 3]
+        last = sizes[part] - 1
+        x0, y0 = rings[part, last, 0], rings[part, last, 1]
+        for i in range(last + 1 if inside else 0):
+            x1, y1 = rings[part, i, 0], rings[part, i, 1]
             inside &= (x1 - x0) * (y - y0) >= (y1 - y0) * (x - x0)
             x0, y0 = x1, y1
         if inside:
