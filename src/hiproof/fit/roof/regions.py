@@ -31,7 +31,7 @@ def list_places(
     regions = draw_regions(roof, outline)
     if len(regions) == 1:
         return [(0, regions[0], len(regions[0]) > 1)]
-    visible = draw_visible(drawing)
+    visible: dict[int, shapely.Geometry] = {}
     groups: dict[tuple, dict[int, list[int]]] = {}
     first = join_fragments(roof, drawing)
     for f in range(drawing.count[0]):
@@ -46,9 +46,13 @@ def list_places(
         whole = [p for k in owners for p in regions[k]]
         if len(owners) > 1:
             whole = list_polygons(unite(whole))
+        if len(places_of_one) == 1:
+            places += [(owner, whole, len(owners) > 1)] if whole else []
+            continue
+        visible = visible or draw_visible(drawing)
         areas = [unite_fragments(drawing, fragments) for fragments in places_of_one.values()]
         apart = list_polygons(unite(areas))
-        inside = max(len(areas), len(apart)) > 1 and is_inside(visible, owner)
+        inside = is_inside(visible, owner)
         large = [area for area in (apart if inside else areas) if area.area > LEAST_PLACE_M2]
         if len(large) < 2 or (not inside and crosses(visible, owner, large)):
             places += [(owner, whole, len(owners) > 1 or len(large) > 1)] if whole else []
@@ -132,7 +136,8 @@ def draw_regions(roof: Tables, outline: shapely.Polygon) -> list[list[shapely.Po
                     region = subtract(region, quad)
             regions[k] = region
     lists = [list_polygons(region) for region in regions]
-    bare = subtract(outline, unite(quads))
+    has_base = any(is_endless(roof, k) for k in range(len(quads)))
+    bare = shapely.Polygon() if has_base else subtract(outline, unite(quads))
     gaps: dict[tuple[int, int], list[shapely.Polygon]] = {}
     for gap in map(widen_gap, list_polygons(bare)):
         gaps.setdefault(find_neighbour(gap, lists), []).append(gap)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from itertools import combinations, pairwise
-
 import numpy as np
 import shapely
 
+from ...geometry.point_in_polygon import find_inside
+from ...geometry.rings import ring_edges
 from ..prices import DEAD_M, NARROW_M
 from .draw import RING_CORNERS
 from .price import Site
@@ -73,25 +73,16 @@ def list_outline_lines(outline: shapely.Polygon) -> np.ndarray:
 
     They are a, b, c, x and y of the middle, and 1 for an edge, else 0.
     """
-    segments = []
-    oriented = shapely.orient_polygons(outline)
-    for ring in (oriented.exterior, *oriented.interiors):
-        corners = shapely.get_coordinates(ring)
-        steps = np.linalg.norm(np.diff(corners, axis=0), axis=1)
-        segments += [
-            (start, end)
-            for start, end, length in zip(corners, corners[1:], steps, strict=False)
-            if length >= SHORTEST_EDGE_M
-        ]
-    n_edges = len(segments)
+    starts, ends = ring_edges(shapely.orient_polygons(outline))
+    is_long = np.hypot(*(ends - starts).T) >= SHORTEST_EDGE_M
+    n_edges = np.count_nonzero(is_long)
     corners = shapely.get_coordinates(outline.exterior)[:-1]
-    if len(corners) <= CHORD_CORNERS:
-        segments += [
-            (start, end)
-            for (i, start), (j, end) in combinations(enumerate(corners), 2)
-            if 1 < j - i < len(corners) - 1 and np.hypot(*(end - start)) >= SHORTEST_CHORD_M
-        ]
-    start, end = np.array(segments).reshape(-1, 2, 2).swapaxes(0, 1)
+    i, j = np.triu_indices(len(corners) if len(corners) <= CHORD_CORNERS else 0, 2)
+    is_chord = (j - i < len(corners) - 1) & (
+        np.hypot(*(corners[j] - corners[i]).T) >= SHORTEST_CHORD_M
+    )
+    start = np.concatenate([starts[is_long], corners[i[is_chord]]])
+    end = np.concatenate([ends[is_long], corners[j[is_chord]]])
     along = end - start
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     normal = np.column_stack([-along[:, 1], along[:, 0]])
@@ -113,11 +104,13 @@ def list_bays(
     ring = shapely.get_coordinates(shapely.orient_polygons(outline).exterior)
     reach = np.hypot(*np.ptp(ring, axis=0))
     sides, heights = [], []
-    for start, end in pairwise(ring):
-        along = (end - start) / max(np.hypot(*(end - start)), 1e-9)
-        out = np.array([along[1], -along[0]])
-        if np.hypot(*(end - start)) < SHORTEST_EDGE_M or ((ring - start) @ out).max() < BAY_DEPTH_M:
-            continue
+    steps = np.diff(ring, axis=0)
+    lengths = np.hypot(*steps.T)
+    ways = steps / np.maximum(lengths, 1e-9)[:, None]
+    outs = np.column_stack([ways[:, 1], -ways[:, 0]])
+    depths = (ring @ outs.T).max(axis=0) - (ring[:-1] * outs).sum(axis=1)
+    for k in np.flatnonzero((lengths >= SHORTEST_EDGE_M) & (depths >= BAY_DEPTH_M)).tolist():
+        start, end, along, out = ring[k], ring[k + 1], ways[k], outs[k]
         beyond = shapely.Polygon(
             [
                 start - reach * along,
@@ -129,7 +122,7 @@ def list_bays(
         for bay in shapely.get_parts(shapely.intersection(outline, beyond)):
             if bay.geom_type != "Polygon" or not SMALLEST_BAY_M2 < bay.area < LARGEST_BAY_M2:
                 continue
-            inside = shapely.contains_xy(bay, points[:, :2])
+            inside = find_inside(bay, points[:, 0], points[:, 1])
             if inside.sum() < BAY_POINTS:
                 continue
             in_bay |= inside
@@ -152,6 +145,9 @@ def split_convex(polygon: shapely.Polygon) -> list[np.ndarray]:
     Triangles are merged over their longest common edges as long as the result is convex (Hertel and
     Mehlhorn 1983).
     """
+    ring = shapely.get_coordinates(shapely.orient_polygons(polygon).exterior)[:-1]
+    if not polygon.interiors and len(ring) <= MOST_PART_CORNERS and is_convex(ring):
+        return [ring]
     triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(polygon))
     triangles = shapely.orient_polygons(triangles[shapely.area(triangles) > CONVEX_PART_M2])
     rings = {i: [tuple(c) for c in t.exterior.coords[:-1]] for i, t in enumerate(triangles)}
@@ -180,8 +176,7 @@ def merge_rings(ring: list, other: list, start: tuple, end: tuple) -> list:
     return [*first, *second[1:-1]]
 
 
-def is_convex(ring: list) -> bool:
-    a = np.array(ring)
-    step = np.roll(a, -1, axis=0) - a
+def is_convex(ring: list | np.ndarray) -> bool:
+    step = np.roll(ring, -1, axis=0) - ring
     following = np.roll(step, -1, axis=0)
     return bool((step[:, 0] * following[:, 1] - step[:, 1] * following[:, 0] > -1e-9).all())
