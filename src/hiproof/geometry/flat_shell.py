@@ -53,9 +53,9 @@ class FlatShell:
     @cached_property
     def after(self) -> np.ndarray:
         """The corner that follows each corner in its ring."""
-        after = np.arange(len(self.index)) + 1
-        is_last = np.isin(after, self.ring_start)
-        return np.where(is_last, self.ring_start[self.ring_of], after)
+        after, has_corners = np.arange(len(self.index)) + 1, self.sizes > 0
+        after[self.ring_start[1:][has_corners] - 1] = self.ring_start[:-1][has_corners]
+        return after
 
     @cached_property
     def corners(self) -> np.ndarray:
@@ -80,7 +80,9 @@ class FlatShell:
 
     def draw_faces(self, faces: np.ndarray, flat: np.ndarray) -> np.ndarray:
         """Return the polygons of ascending `faces` (k,), whose corners are at `flat` (n, 2)."""
-        corners = np.flatnonzero(np.isin(self.face_of, faces))
+        is_drawn = np.zeros(self.faces, bool)
+        is_drawn[faces] = True
+        corners = np.flatnonzero(is_drawn[self.face_of])
         numbers, ring_of = np.unique(self.ring_of[corners], return_inverse=True)
         rings = shapely.linearrings(flat[corners], indices=ring_of)
         return shapely.polygons(rings, indices=np.searchsorted(faces, self.face_of_ring[numbers]))
