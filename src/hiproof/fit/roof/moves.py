@@ -24,6 +24,7 @@ from .tables import (
     add_plane,
     add_unknown,
     drop_plane,
+    find_lowest_plane,
     measure_middle,
     place_volume,
     read_line,
@@ -50,7 +51,8 @@ from .tables import (
     # and one more from that line, as at its other end, if d
     TO_EAVE,  # plane b of volume a rises from height c, and so does the side that it faces
     TO_POINTS,  # side b of volume a where points say that it ends, as it leans
-) = range(18)
+    TAKE,  # plane d of volume c becomes one more of volume a, whose side b runs on if it is one
+) = range(19)
 MOVE_COLUMNS = 5  # Numbers of a move: its kind and four more.
 # What to try of a volume. One whose unknowns are shared is where it was.
 NO_MOVES, SHARES_ONLY, ALL_MOVES = range(3)
@@ -119,6 +121,9 @@ def list_moves(roof, site, asked, moves):
             if is_near(roof.boxes[j], box, NEIGHBOUR_M):
                 count = list_merges(roof, site, j, k, moves, count)
                 count = list_equal_planes(roof, site, j, k, moves, count)
+                if not site.keeps_shapes:
+                    count = list_taken_planes(roof, site, j, k, moves, count)
+                    count = list_taken_planes(roof, site, k, j, moves, count)
     for bay in range(len(site.bay_heights) if count > 0 else 0):
         count = write_move(moves, count, ADD_BAY, bay, 0, 0, 0)
     return list_shares(roof, site, asked, moves, count)
@@ -166,6 +171,27 @@ def list_equal_planes(roof, site, j, k, moves, count):
             ):
                 count = write_move(moves, count, ONE_PLANE, j, p, k, q)
                 count = write_move(moves, count, ONE_PLANE, k, q, j, p)
+    return count
+
+
+@compiled
+def list_taken_planes(roof, site, j, k, moves, count):
+    """Write the planes of volume j that may end volume k: above it in its middle."""
+    x, y = find_centre(roof, k, site)
+    top, _ = find_lowest_plane(roof, k, x, y)
+    for p in range(roof.n_planes[j] if roof.n_planes[k] < VOLUME_PLANES else 0):
+        row = roof.planes[j, p]
+        if roof.slopes[j, p] < 0 or row[0] * x + row[1] * y + row[2] < top:
+            continue
+        a, b, _ = read_line(roof, roof.plane_lines[j, p])
+        if is_faced(roof, k, a, b):
+            continue
+        best, most = 0, -1.0
+        for s in range(N_SIDES):
+            cosine = a * roof.half_planes[k, s, 0] + b * roof.half_planes[k, s, 1]
+            best, most = (s, cosine) if cosine > most else (best, most)
+        count = write_move(moves, count, TAKE, k, -1, j, p)
+        count = write_move(moves, count, TAKE, k, best, j, p)
     return count
 
 
@@ -374,6 +400,13 @@ def apply_move(roof, move, site, changed):
         if is_possible:
             roof.plane_lines[a, b], roof.heights[a, b] = roof.plane_lines[c, d], roof.heights[c, d]
             roof.slopes[a, b] = roof.slopes[c, d]
+    elif kind == TAKE:
+        is_possible = d < roof.n_planes[c]
+        if is_possible:
+            line, height, slope = roof.plane_lines[c, d], roof.heights[c, d], roof.slopes[c, d]
+            add_plane(roof, a, line, height, slope)
+        if b >= 0:
+            roof.sides[a, b] = find_new_side(roof, RUN_ON, a, b, len(RUN_ON_STEPS_M) - 1, site)
     elif kind == TO_POINTS:
         d, e, f = find_end(roof, a, b, site, True)
         is_possible = d != 0.0 or e != 0.0
