@@ -64,6 +64,7 @@ SIDE_MOVE_M = 1.6  # Furthest (m) that the middle of a side moves to another lin
 LINE_COSINE = 0.94  # Cosine of the angle between a side and the line to which it moves.
 SAME_DIRECTION = 0.97  # The same of sides of volumes that merge.
 FACING_COSINE = 0.9  # The same of a plane and the side that it faces.
+ALIKE_COSINE = 0.7  # The same of a plane and one of another volume that may end it instead.
 BESIDE_CORNER_M = 0.1  # Distance (m) outside a volume of the middle of a wall over its corner.
 BESIDE_WALL_M = 0.3  # Distance (m) from the middle of a wall of a line that is meant to be its own.
 COVER_M = 0.3  # Least distance (m) of a side from the wall to which its volume is drawn out.
@@ -184,6 +185,10 @@ def list_taken_planes(roof, site, j, k, moves, count):
         if roof.slopes[j, p] < 0 or row[0] * x + row[1] * y + row[2] < top:
             continue
         a, b, _ = read_line(roof, roof.plane_lines[j, p])
+        for q in range(roof.n_planes[k]):
+            c, d, _ = read_line(roof, roof.plane_lines[k, q])
+            if roof.slopes[k, q] >= 0 and ALIKE_COSINE < a * c + b * d < 1.0 - 1e-6:
+                count = write_move(moves, count, ONE_PLANE, k, q, j, p)
         if is_faced(roof, k, a, b):
             continue
         best, most = 0, -1.0
