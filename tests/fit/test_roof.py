@@ -1,9 +1,12 @@
 """Laws of a roof's state, price and moves, on simulated compounds."""
 
+import math
+
 import numpy as np
 import pytest
 import shapely
 
+from hiproof.compose import compose
 from hiproof.fit.prices import compute_unit
 from hiproof.fit.roof import add, fit_building, improve_all, read_parts, start_roof
 from hiproof.fit.roof.accept import fit_roof, try_move
@@ -27,9 +30,11 @@ from hiproof.fit.roof.tables import (
 )
 from hiproof.fit.union.plan import lay_out_plan
 from hiproof.fit.union.search import find_volumes
+from hiproof.model import ROOF, Roof
 from hiproof.settings import Settings
 from hiproof.simulate import COMPOUND_KINDS, ScanSettings, random_compound, scan
 from hiproof.simulate.scene import Defects
+from roof_zoo import FRAME
 
 
 def scan_compound(kind, seed=0, density=3.0):
@@ -260,3 +265,32 @@ def test_a_row_of_small_dormers_is_complete():
         z = np.maximum(10.0 - np.abs(y - 5.5), dormers) + rng.normal(0.0, 0.03, len(x))
         missing += max(9 - len(fit_building(np.column_stack([x, y, z]), outline).roof_parts), 0)
     assert missing <= 12  # of 160; without copies 26
+
+
+def scan_bent_house(rng):
+    """Return the outline and the points of two wings at an angle, of one pitch and one eave.
+
+    Outside of the bend their planes meet in a hip, inside in a valley.
+    """
+    bend, width = math.radians(rng.uniform(20.0, 65.0)), rng.uniform(3.2, 4.5)
+    ways = np.array([[1.0, 0.0], [math.cos(bend), math.sin(bend)]])
+    across = np.column_stack([-ways[:, 1], ways[:, 0]])
+    inner = np.linalg.solve(across, np.full(2, width))
+    ends = ways * rng.uniform(9.0, 14.0, (2, 1)) * [[-1.0], [1.0]]
+    start, end = ([ends[k] + s * width * across[k] for s in (1, -1)] for k in (0, 1))
+    outline = shapely.Polygon([start[0], start[1], -inner, end[1], end[0], inner])
+    xy = rng.uniform(*np.array(outline.bounds).reshape(2, 2), (int(6 * outline.envelope.area), 2))
+    xy = xy[shapely.contains_xy(outline, *xy.T)]
+    outer, inner = width + xy @ across.T, width - xy @ across.T
+    rise = np.minimum(outer.min(axis=1, keepdims=True), inner).max(axis=1)
+    z = 5.0 + rng.uniform(0.5, 1.1) * rise + rng.normal(0.0, 0.02, len(xy))
+    return outline, np.column_stack([xy, z])
+
+
+def test_wings_at_an_angle_meet_in_a_hip_and_a_valley():
+    counts = []
+    for seed in range(40):
+        outline, points = scan_bent_house(np.random.default_rng(seed))
+        roof = Roof(fit_building(points, outline).roof_parts, outline, FRAME)
+        counts.append(len(compose(roof, 0.0).select_faces(ROOF)))
+    assert counts.count(4) >= 39
