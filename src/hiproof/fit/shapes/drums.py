@@ -14,10 +14,13 @@ import shapely
 
 from ...model import Part, Piece
 from ...primitives.facets import CHORD_M, find_apothem, find_sides, make_rim
+from ..prices import CORNER_UNITS, UNKNOWN_UNITS
 from .accept import CIRCLE_NUMBERS, SAME_LEVEL_M, PartsRoof
 from .arcs import TURRET_DEG, Arc, cut_to_outline
 from .regions import select_touching, unite_outlines
 
+# Numbers of a drum: those of its circle, and what the corners of a box cost, which is as simple.
+DRUM_NUMBERS = CIRCLE_NUMBERS + round(4.0 * CORNER_UNITS / UNKNOWN_UNITS)
 BEYOND_DRUM = 1.5  # Points within so many radii show the step.
 CIRCLE_ROUNDS = 3  # Rounds in which the circle is found.
 EDGE_SOFTNESS_M = (0.3, 0.2, 0.1, 0.05)  # How far off its side (m) points may lie, round by round.
@@ -47,7 +50,7 @@ def list_drums(roof: PartsRoof, part: Part, own: np.ndarray) -> Iterator[tuple[P
         circle, right_share = find_circle(roof, level, start)
         drum = make_drum(circle[:2], float(circle[2]), level)
         if right_share > 0.0 and shapely.covers(roof.outline, drum.outlines[0]):
-            yield drum, CIRCLE_NUMBERS
+            yield drum, DRUM_NUMBERS
 
 
 def find_circle(roof: PartsRoof, level: float, start: np.ndarray) -> tuple[np.ndarray, float]:
