@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import Any
 
 from numba import types
-from numba.core import cgutils
 from numba.extending import intrinsic, overload
 
 
@@ -40,7 +39,7 @@ def drop_owners(_, rows):
 def drop(context, builder, kind, value):
     if isinstance(kind, types.Array):
         array = context.make_array(kind)(context, builder, value)
-        array.meminfo = cgutils.get_null_value(array.meminfo.type)
+        array.meminfo = array.meminfo.type(None)  # a null pointer
         return array._getvalue()
     for k, inner in enumerate(kind.types if isinstance(kind, types.BaseTuple) else ()):
         part = drop(context, builder, inner, builder.extract_value(value, k))

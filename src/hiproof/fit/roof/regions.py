@@ -46,13 +46,12 @@ def list_places(
         whole = [p for k in owners for p in regions[k]]
         if len(owners) > 1:
             whole = list_polygons(unite(whole))
-        if len(places_of_one) == 1:
-            places += [(owner, whole, len(owners) > 1)] if whole else []
-            continue
-        visible = visible or draw_visible(drawing)
         areas = [unite_fragments(drawing, fragments) for fragments in places_of_one.values()]
-        apart = list_polygons(unite(areas))
-        inside = is_inside(visible, owner)
+        apart = list_polygons(unite(areas) if len(areas) > 1 else areas[0])
+        inside = max(len(areas), len(apart)) > 1
+        if inside:
+            visible = visible or draw_visible(drawing)
+            inside = is_inside(visible, owner)
         large = [area for area in (apart if inside else areas) if area.area > LEAST_PLACE_M2]
         if len(large) < 2 or (not inside and crosses(visible, owner, large)):
             places += [(owner, whole, len(owners) > 1 or len(large) > 1)] if whole else []
