@@ -125,10 +125,8 @@ def list_moves(roof, site, asked, moves):
                 continue
             if is_near(roof.boxes[j], box, NEIGHBOUR_M):
                 count = list_merges(roof, site, j, k, moves, count)
-                count = list_equal_planes(roof, site, j, k, moves, count)
-                if not site.keeps_shapes:
-                    count = list_taken_planes(roof, site, j, k, moves, count)
-                    count = list_taken_planes(roof, site, k, j, moves, count)
+                count = list_taken_planes(roof, site, j, k, moves, count)
+                count = list_taken_planes(roof, site, k, j, moves, count)
     for bay in range(len(site.bay_heights) if count > 0 else 0):
         count = write_move(moves, count, ADD_BAY, bay, 0, 0, 0)
     return list_shares(roof, site, asked, moves, count)
@@ -157,43 +155,28 @@ def list_merges(roof, site, j, k, moves, count):
 
 
 @compiled
-def list_equal_planes(roof, site, j, k, moves, count):
-    """Write the planes of volumes j and k that are nearly one."""
-    x, y = find_centre(roof, k, site)
-    for p in range(roof.n_planes[j]):
-        for q in range(roof.n_planes[k]):
-            a, b = roof.planes[j, p], roof.planes[k, q]
-            is_one = roof.heights[j, p] == roof.heights[k, q] and (
-                roof.slopes[j, p] == roof.slopes[k, q]
-                and roof.plane_lines[j, p] == roof.plane_lines[k, q]
-            )
-            gap = abs((a[0] - b[0]) * x + (a[1] - b[1]) * y + a[2] - b[2])
-            if (
-                not is_one
-                and min(roof.slopes[j, p], roof.slopes[k, q]) >= 0
-                and np.hypot(a[0] - b[0], a[1] - b[1]) < ALIKE_SLOPES
-                and gap < ALIKE_HEIGHTS_M
-            ):
-                count = write_move(moves, count, ONE_PLANE, j, p, k, q)
-                count = write_move(moves, count, ONE_PLANE, k, q, j, p)
-    return count
-
-
-@compiled
 def list_taken_planes(roof, site, j, k, moves, count):
-    """Write the planes of volume j that may end volume k: above it in its middle."""
+    """Write the planes of volume j that may stand for one of volume k, or end it."""
     x, y = find_centre(roof, k, site)
     top, _ = find_lowest_plane(roof, k, x, y)
-    for p in range(roof.n_planes[j] if roof.n_planes[k] < VOLUME_PLANES else 0):
-        row = roof.planes[j, p]
-        if roof.slopes[j, p] < 0 or row[0] * x + row[1] * y + row[2] < top:
+    least = FACING_COSINE if site.keeps_shapes else ALIKE_COSINE
+    has_room = roof.n_planes[k] < VOLUME_PLANES and not site.keeps_shapes
+    for p in range(roof.n_planes[j]):
+        if roof.slopes[j, p] < 0:
             continue
         a, b, _ = read_line(roof, roof.plane_lines[j, p])
+        is_alike = False
         for q in range(roof.n_planes[k]):
             c, d, _ = read_line(roof, roof.plane_lines[k, q])
-            if roof.slopes[k, q] >= 0 and ALIKE_COSINE < a * c + b * d < 1.0 - 1e-6:
-                count = write_move(moves, count, ONE_PLANE, k, q, j, p)
-        if is_faced(roof, k, a, b):
+            if roof.slopes[k, q] >= 0 and a * c + b * d > least:
+                is_alike |= a * c + b * d > FACING_COSINE
+                is_one = roof.heights[j, p] == roof.heights[k, q]
+                is_one &= roof.slopes[j, p] == roof.slopes[k, q]
+                if not (is_one and roof.plane_lines[j, p] == roof.plane_lines[k, q]):
+                    count = write_move(moves, count, ONE_PLANE, k, q, j, p)
+        row = roof.planes[j, p]
+        is_above = row[0] * x + row[1] * y + row[2] >= top
+        if is_alike or not (is_above and has_room):
             continue
         best, most = 0, -1.0
         for s in range(N_SIDES):
