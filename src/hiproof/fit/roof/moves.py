@@ -52,8 +52,7 @@ from .tables import (
     TO_EAVE,  # plane b of volume a rises from height c, and so does the side that it faces
     TO_POINTS,  # side b of volume a where points say that it ends, as it leans
     TAKE,  # plane d of volume c becomes one more of volume a, whose side b runs on if it is one
-    PART,  # plane b of volume a has a height (c 0) or a slope (c 1) of its own
-) = range(20)
+) = range(19)
 MOVE_COLUMNS = 5  # Numbers of a move: its kind and four more.
 # What to try of a volume. One whose unknowns are shared is where it was.
 NO_MOVES, SHARES_ONLY, ALL_MOVES = range(3)
@@ -98,9 +97,6 @@ def list_moves(roof, site, asked, moves):
         for p in range(roof.n_planes[k]):
             if roof.n_planes[k] > 1 and not site.keeps_shapes:
                 count = write_move(moves, count, LEAVE_PLANE, k, p, 0, 0)
-            for u, column in ((roof.heights[k, p], 0), (roof.slopes[k, p], 1)):
-                if u >= 0 and count_users(roof, u) > 1:
-                    count = write_move(moves, count, PART, k, p, column, 0)
             if roof.slopes[k, p] >= 0:
                 for alone in range(2 if roof.n_planes[k] > 1 else 1):
                     count = write_move(moves, count, MAKE_LEVEL, k, p, alone, 0)
@@ -447,9 +443,6 @@ def change_plane(roof, move, site):
             line = add_line(roof, d, e, -d * x - e * y)
         roof.heights[k, b] = add_unknown(roof, roof.values[roof.heights[k, b]])
         roof.plane_lines[k, b], roof.slopes[k, b] = line, add_unknown(roof, 0.0)
-    elif kind == PART:
-        column = roof.slopes if c else roof.heights
-        column[k, b] = add_unknown(roof, roof.values[column[k, b]])
     elif kind == TO_EAVE and not is_level:
         return put_on_eave(roof, k, b, c, site)
     elif kind == MAKE_LEVEL and not is_level:
