@@ -519,7 +519,7 @@ def test_models_that_ended_have_a_table_of_their_own(database, tmp_path):
         "z_top": 8.0,
         "outline": [RING],
         "origin": [85000.0, 446000.0, 0.0],
-        "parts": [{}],
+        "parts": [{"type": "flat", "parameters": {}, "position": [0.0, 0.0, 8.0]}],
     }
     change = {"class": "changed", "places": [], "history": [ended]}
     write_all(tmp_path, [replace(house, change=change)], "EPSG:7415")
