@@ -75,6 +75,30 @@ def row_over_half(folder, code, with_ground=True):
     return run_points(folder, *points, TOWN.footprints, terrain=terrain)[0]["house-0"]
 
 
+@pytest.mark.parametrize("with_ground", [True, False])
+@pytest.mark.parametrize(
+    ("rise", "slope", "is_named"),
+    [(3.0, 0.0, True), (3.0, 0.1, True), (-2.6, 0.0, True), (0.8, 0.0, False), (0.0, 0.3, False)],
+)
+def test_a_step_of_the_terrain_at_the_outline_is_named(
+    rise, slope, is_named, with_ground, tmp_path
+):
+    """A raster is interpolated, so that half of such a step lies at the corners."""
+    (area,) = TOWN.footprints.values()
+    x, y = np.meshgrid(ORIGIN[0] - 19.5 + np.arange(80), ORIGIN[1] + 59.5 - np.arange(80))
+    heights = ORIGIN[2] + 9.0 + slope * (x - area.centroid.x)
+    terrain = write_terrain(
+        tmp_path / "dtm.tif", heights + np.where(shapely.contains_xy(area, x, y), rise, 0.0)
+    )
+    xyz, is_roof = TOWN.xyz + [0, 0, 9.0], TOWN.classification == 6
+    xyz[:, 2] += slope * (np.where(is_roof, area.centroid.x, xyz[:, 0]) - area.centroid.x)
+    chosen = is_roof | with_ground
+    points = xyz[chosen], TOWN.classification[chosen]
+    row = run_points(tmp_path, *points, TOWN.footprints, terrain=terrain)[0]["house-0"]
+    assert (f"m {'above' if rise > 0 else 'below'} " in row["detail"]) == is_named
+    assert is_named == ("around it" in row["detail"]), row["detail"]
+
+
 @pytest.mark.parametrize(
     ("rise", "slope", "words"),
     [

@@ -95,6 +95,30 @@ def test_a_small_rest_that_stands_is_not_demolished(run, density, tmp_path):
     assert take_kind(after["house-3"]) == "demolished"
 
 
+@pytest.mark.parametrize(("east", "kind"), [(2.0, "moved"), (0.9, "moved"), (0.0, "unchanged")])
+def test_a_house_built_anew_beside_its_place_was_moved(run, east, kind, tmp_path):
+    town = make_town(seed=7, density=8.0)
+    x0, y0, x1, y1 = town.footprints["house-0"].bounds
+    is_house = shapely.intersects_xy(shapely.box(x0, y0, x1, y1), *town.xyz[:, :2].T)
+    heights, classes = town.xyz[is_house] + [east, 0, 0], town.classification[is_house]
+    lay_bare(town, "house-0", 0.0)
+    is_under = shapely.intersects_xy(shapely.box(x0 + east, y0, x1 + east, y1), *town.xyz[:, :2].T)
+    town = dataclasses.replace(
+        town,
+        xyz=np.concatenate([town.xyz[~is_under], heights]),
+        classification=np.concatenate([town.classification[~is_under], classes]),
+    )
+    before, after = by_id(run)["house-0"], update(run, tmp_path / "out", town)["house-0"]
+    assert take_kind(after) == kind
+    places = [
+        row["origin"][0] + shapely.Polygon(row["parts"][0]["outlines"][0][0]).centroid.x
+        for row in (before, after)
+    ]
+    assert places[1] - places[0] == pytest.approx(east, abs=0.15)
+    if east:
+        assert after["change"]["places"][0]["area"] == pytest.approx(east * (y1 - y0), rel=0.2)
+
+
 def stand_on_slope(town, slope):
     """Raise the ground of a town to a slope to the east and to the north, and houses with it."""
     places = town.xyz[:, :2].copy()

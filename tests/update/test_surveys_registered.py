@@ -254,6 +254,14 @@ def test_a_strip_that_lies_elsewhere_with_its_ground_is_no_change_in_silence(up)
     assert "4 of 16 sampled roofs lie elsewhere together with the ground around them" in text
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_a_strip_that_lies_aside_is_no_change_in_silence(seed):
+    """Half of the roofs lie 0.8 m to the east, so one half or the other counts as changed."""
+    strips = [draw_samples(2 * seed + k, [0.0] * 12, [0.8 * k, 0.0, 0.0]) for k in range(2)]
+    texts = [text for text in catch_warnings(strips[0] + strips[1]) if "in the plan" in text]
+    assert len(texts) == 1 and int(texts[0].split(" of 24")[0].split()[-1]) >= 4
+
+
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("share", [0.0, 0.3])
 def test_a_usual_survey_gets_no_warning(seed, share):

@@ -15,6 +15,7 @@ from ..compose.blocks import make_box
 from ..errors import InputError
 from ..model import ROOF, Building, Solid
 from ..read.crs import find_units, horizontal_crs, parse_crs
+from ..read.terrain import read_terrain
 from ..settings import EnrichSettings
 from ..write.attribute_list import OWN
 from ..write.head import FileHead
@@ -24,7 +25,7 @@ from .party import Town
 from .records import MOST_KEPT, Records
 from .sun import Irradiation, Sky, irradiate, make_sky, sample_face, sample_wall
 from .walls import find_walls, measure_faces
-from .weather import import_pvlib, name_sky
+from .weather import import_pvlib, name_sky, read_year
 
 SHADE_REACH_M = 200.0  # distance (m) up to which buildings shade
 # Elevation (degrees) below which buildings count as none: the sun is weak there, and trees and
@@ -266,11 +267,15 @@ def round_values(values: dict[str, float], digits: int) -> dict[str, Any]:
 
 
 def refuse_unusable(settings: EnrichSettings) -> None:
-    """Raise InputError where pvlib, another option or the horizon is missing or unreadable."""
+    """Raise InputError where pvlib, another option or a file is missing or unreadable."""
     if settings.sun:
         import_pvlib()
         if settings.horizon:
             read_horizon(settings.horizon)
+        if settings.weather:
+            read_year(settings.weather)
+        if settings.shading_terrain:
+            read_terrain(settings.shading_terrain)
         return
     for name, option in FOR_SUN.items():
         if getattr(settings, name):

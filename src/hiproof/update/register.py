@@ -80,6 +80,9 @@ same shift, and where there is no ground."""
 FEWEST_ROOFS = 8
 """Roofs from which on their noise is estimated rather than assumed, and carry a shift alone."""
 
+FEWEST_ASIDE = 4
+"""Roofs that have to lie elsewhere together: chance brings two or three changed ones together."""
+
 FEWEST_TILT_PLACES = 6
 """Places with ground from which on a tilt is looked for: a plane takes three."""
 
@@ -122,9 +125,10 @@ class SurveyShift:
 
     `sigma` has the standard deviations. `agreeing` of so many `roofs` lie where the shift puts
     them, and the ground at so many `places` shows it, by `ground` (m). `repeated` of the roofs have
-    the points of the earlier survey, `moved` lie elsewhere together with the ground around them.
-    `tilt` (m) is how much higher one end of the area lies than the other. With a `doubt`, a
-    sentence, the shift is not applied. `noise` is what is left between unchanged roofs.
+    the points of the earlier survey, `moved` lie elsewhere together with the ground around them,
+    and `aside` together elsewhere in the plan. `tilt` (m) is how much higher one end of the area
+    lies than the other. With a `doubt`, a sentence, the shift is not applied. `noise` is what is
+    left between unchanged roofs.
     """
 
     xyz: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -135,6 +139,7 @@ class SurveyShift:
     ground: float = 0.0
     repeated: int = 0
     moved: int = 0
+    aside: int = 0
     tilt: float = 0.0
     doubt: str = ""
     noise: SurveyNoise = field(default_factory=SurveyNoise)
@@ -193,6 +198,9 @@ class SurveyShift:
             "around them: strips of a survey do not fit each other, or the ground moved. Such "
             "roofs count as raised or lowered; check their ground first": self.moved
             and not (self.doubt or self.tilt),
+            f"{self.aside} of {self.roofs} sampled roofs lie together elsewhere in the plan: "
+            "strips of a survey do not fit each other. Roofs there count as changed; correct the "
+            "strips, or update with the files of one at a time": self.aside,
             f"the shift of {x:+.2f} m to the east and {y:+.2f} m to the north rests on "
             f"{self.agreeing} of {self.roofs} sampled roofs. So few may show their own changes or "
             "another shift; if it is known, pass --shift EAST,NORTH,UP": is_estimated
@@ -260,7 +268,7 @@ def register_surveys(samples: Iterable[SampledRoof], read: ReadSettings) -> Surv
         shift, sigma = np.array(fixed), np.zeros(3)
     else:
         shift, sigma = solve_shift(rows, ground, float(np.median(heights)))
-    level = measure_level(ground, shift)
+    level, aside = measure_level(ground, shift), count_aside(rows, ground, shift)
     ground[:, 2] += ground[:, 3:] @ shift[:2]
     offsets = np.array([np.median(residuals - design @ shift) for design, residuals in rows])
     is_agreeing = np.abs(offsets) < SHIFT_SCALE_M
@@ -278,6 +286,7 @@ def register_surveys(samples: Iterable[SampledRoof], read: ReadSettings) -> Surv
         round(level, 4),
         sum(repeats_points(sample) for sample, _ in pairs),
         int(is_moved.sum()),
+        aside,
         measure_tilt(ground, roofs) if len(ground) else measure_tilt(roofs[is_agreeing], roofs),
     )
     areas = np.array([sample.roof.outline.area for sample, _ in pairs])
@@ -291,6 +300,28 @@ def register_surveys(samples: Iterable[SampledRoof], read: ReadSettings) -> Surv
     noise = measure_noise(unchanged)
     tilted = max(noise.roof, round(result.tilt / math.sqrt(12), 4))  # of evenly spread places
     return dataclasses.replace(result, noise=dataclasses.replace(noise, roof=tilted))
+
+
+def count_aside(
+    rows: list[tuple[np.ndarray, np.ndarray]], ground: np.ndarray, shift: np.ndarray
+) -> int:
+    """Return how many roofs the common `shift` (3,) leaves off, and another one in the plan fits.
+
+    Changes lead each its own way, so only strips that lie aside bring several together.
+    """
+    left = [row for row in rows if not fits(row, shift)]
+    if len(left) < FEWEST_ASIDE:
+        return 0
+    other = solve_shift(left, ground, 0.0)[0]
+    count = sum(fits(row, other) for row in left)
+    is_other = math.hypot(*(other - shift)[:2]) > USUAL_ASIDE_M
+    return count if is_other and count >= FEWEST_ASIDE else 0
+
+
+def fits(row: tuple[np.ndarray, np.ndarray], shift: np.ndarray) -> bool:
+    """Return whether a shift (3,) puts most points of a roof on it."""
+    design, residuals = row
+    return bool(np.median(np.abs(residuals - design @ shift)) < SAME_HEIGHT_M)
 
 
 def measure_level(ground: np.ndarray, shift: np.ndarray) -> float:

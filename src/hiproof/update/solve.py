@@ -18,7 +18,7 @@ import shapely
 
 from ..city.folder.ledger import Outcome
 from ..city.plan.overrides import load_overrides
-from ..city.plan.work_plan import Job, WorkPlan, load_plan
+from ..city.plan.work_plan import Job, WorkPlan, load_plan, make_job
 from ..city.work.solve import (
     KeepFailure,
     keep_nothing,
@@ -26,10 +26,12 @@ from ..city.work.solve import (
     solve_buildings,
     solve_one,
 )
+from ..fit.align import AROUND_M, find_shift
 from ..model import Building, Roof
 from ..parametric.building import build, with_model
 from ..parametric.override import Override
 from ..parametric.record import read_building
+from ..stages.points import distinct
 from ..stages.remarks import add_remark
 from ..status import Change, ChangeKind, Doubt, Status
 from ..write.fragments import Fragments
@@ -37,7 +39,7 @@ from ..write.run_files import fragments
 from .cells import SAME_SIGMAS
 from .epochs import JUDGING_FILE, SURVEYS_FILE, Epochs, Surveys, compare_ground, select_roof
 from .ground import Ground
-from .judge import ChangeVerdict, judge_building
+from .judge import OVER_GROUND_M, ChangeVerdict, judge_building
 from .kinds import Difference, name_differences, name_doubts
 from .lineage import continue_parts
 from .members import UpdateMember, load_members
@@ -65,6 +67,10 @@ SHIFT_DIGITS = 3  # of footprints: millimetres
 
 GROUND_MOVED_M = 0.25
 """Height (m) by which the ground around a building moved rather than grass grew on it."""
+
+LEAST_MOVE_M = 0.6
+"""Distance (m) from which on a building stands elsewhere: three standard deviations of the plan
+between two surveys, which are 0.2 m."""
 
 BARE_SHARE = 0.5
 """Share of an outline that has to lie bare before, for a building to be built since."""
@@ -249,6 +255,9 @@ class Updater:
         doubts = record_places(name_doubts(verdict), frame)
         if change is Change.UNCERTAIN:
             return self.mark(earlier, change, chance, doubts, member)
+        place = None if lost is None else self.find_place(job, verdict, earlier)
+        if place is not None:
+            return self.redraw(place, member, earlier, verdict, lost, ChangeKind.MOVED)
         moved = self.move(job, member, earlier, verdict)
         if moved is not None:
             places, lineage = self.name_places(earlier, moved, verdict), range(len(moved.parts))
@@ -262,6 +271,19 @@ class Updater:
                 return self.mark(earlier, change, chance, places, member)  # no pulse passes a roof
             return self.mark(earlier, Change.UNCERTAIN, chance, doubts, member)
         return self.replace_model(job, member, earlier, verdict, new)
+
+    def find_place(self, job: Job, verdict: ChangeVerdict, earlier: Building) -> Job | None:
+        """Return the job where its roof stands now, None where that is its earlier place."""
+        nearby = distinct(self.epochs.new.select_points(job, AROUND_M))
+        local = earlier.roof.frame.to_local(nearby)
+        local = local[local[:, 2] - verdict.ground.height_at(local) > 2 * OVER_GROUND_M]
+        origin = earlier.roof.frame.origin[:2]
+        outline = shapely.transform(job.area, lambda xy: xy - origin)
+        shift = find_shift(local[:, :2], outline)
+        if not shift.is_clear or np.hypot(*shift.xy) < LEAST_MOVE_M or job.footprint is None:
+            return None
+        x, y = shift.xy.round(SHIFT_DIGITS).tolist()
+        return make_job(job.index, job.footprint, (x, y))
 
     def move(
         self, job: Job, member: UpdateMember, earlier: Building, verdict: ChangeVerdict
@@ -304,6 +326,7 @@ class Updater:
         earlier: Building,
         verdict: ChangeVerdict,
         lost: LostParts | None,
+        kind: ChangeKind = ChangeKind.OUTLINE_CHANGED,
     ) -> Building:
         """Return a building over another outline than before."""
         new = self.reconstruct(job, member, lost)
@@ -311,9 +334,11 @@ class Updater:
             return self.mark(earlier, Change.UNCERTAIN, verdict.chance, [], member)
         before = earlier.roof.world_outline
         apart = shapely.symmetric_difference(before, job.area)
-        outline = Difference(
-            ChangeKind.OUTLINE_CHANGED, math.nan, math.nan, job.area.area - before.area, apart
-        )
+        if kind is ChangeKind.MOVED:
+            area_m2 = apart.area / 2  # what is covered now, and was not
+        else:
+            area_m2 = job.area.area - before.area
+        outline = Difference(kind, math.nan, math.nan, area_m2, apart)
         return self.replace_model(job, member, earlier, verdict, new, outline)
 
     def replace_model(

@@ -42,7 +42,7 @@ def find_unseen(roof: Roof, comparison: CellComparison) -> list[Difference]:
         return []
     from scipy.spatial import KDTree  # only where much has no points
 
-    reach = max(REACH_M, math.sqrt(circle_m2 / math.pi)) / side
+    reach = max(REACH_M, math.sqrt(circle_m2 / math.pi), side) / side
     core = empty[KDTree(c.cells[is_seen]).query(empty)[0] > reach]
     if not len(core):
         return []

@@ -243,7 +243,15 @@ FAR_GROUND_M = 2.0
 or two systems.
 """
 
-ASIDE_M = 4.0  # from the corners of an outline: a raster of 2 m mixes no cell of the outline there
+ASIDE_M = np.array([4.0, 6.0, 8.0])
+"""Distances (m) beside the corners of an outline at which a terrain model is looked at: a raster of
+2 m mixes no cell of the outline there."""
+
+INSIDE_M, LEAST_STEP_M, LEAST_ERROR_M, STEP_SIGMAS = 1.5, 1.0, 0.5, 5.0
+"""Distance (m) inside the corners at which all of a step shows, its least height (m), that of what
+shows of it at the corners, where a raster is interpolated, and least number of standard deviations
+of what lies beside it. Houses stand on terraces up to a metre high."""
+
 OTHER_GROUND_M = 5.0
 """Difference (m) from which on the model's height is not used: height systems differ by 10 to 100
 m, codes for "no data" by more, while a model and ground points of one place agree within 2 m also
@@ -280,8 +288,8 @@ def check_terrain(model: TerrainModel, ground: Terrain, xy: np.ndarray) -> str:
     """Return a remark where the terrain model has no true height.
 
     It has none at some of the corners `xy` (n, 2) of an outline, or lies far above or below the
-    ground points there, or its own heights beside them where there are none. The remark is empty
-    otherwise.
+    ground points there, or rises from them at the outline alone. Where there are none its own
+    heights beside the outline count. The remark is empty otherwise.
     """
     coded = model.is_coded_at(xy)
     if coded.any():
@@ -292,16 +300,39 @@ def check_terrain(model: TerrainModel, ground: Terrain, xy: np.ndarray) -> str:
             f"the {model.source} {Doubt.TERRAIN_WITHOUT_HEIGHTS.value} under {text}the building; "
             f"{use}"
         )
-    gap, doubt = model.height_at(xy) - ground.height_at(xy), Doubt.TERRAIN_UNLIKE_GROUND_POINTS
-    is_other = np.abs(gap) > OTHER_GROUND_M
-    if not np.isfinite(gap).any():
-        away = xy - xy.mean(axis=0)
-        beside = xy + ASIDE_M * away / np.maximum(np.hypot(*away.T), ASIDE_M)[:, None]
-        gap, doubt = model.height_at(xy) - model.height_at(beside), Doubt.TERRAIN_UNLIKE_AROUND
-    gap = gap[is_other if is_other.any() else np.isfinite(gap)]
-    above = float(np.median(gap)) if len(gap) else 0.0
-    if abs(above) <= FAR_GROUND_M:
+
+    def compare(xy: np.ndarray) -> np.ndarray:
+        return np.asarray(model.height_at(xy) - ground.height_at(xy))
+
+    gap, doubt = compare(xy), Doubt.TERRAIN_UNLIKE_GROUND_POINTS
+    is_other, is_known = np.abs(gap) > OTHER_GROUND_M, np.isfinite(gap)
+    above = float(np.median(gap[is_other if is_other.any() else is_known])) if len(gap) else 0.0
+    if not is_known.any():
+        doubt, above = Doubt.TERRAIN_UNLIKE_AROUND, measure_step(model.height_at, xy)
+    elif abs(above) <= FAR_GROUND_M:
+        above = measure_step(compare, xy)
+    if not above:
         return ""
     way = "above" if above > 0 else "below"
     use = ", which are used instead" if is_other.any() else ""
     return f"the {model.source} lies {abs(above):.1f} m {way} {doubt.value}{use}"
+
+
+def measure_step(find_heights: Callable[[np.ndarray], np.ndarray], xy: np.ndarray) -> float:
+    """Return by how much (m) heights rise or fall at the corners `xy` (n, 2) of an outline.
+
+    It is 0 where a plane beside them explains it.
+    """
+    away = xy - xy.mean(axis=0)
+    away /= np.maximum(np.hypot(*away.T), 1.0)[:, None]
+    rings = [xy + distance * away for distance in (0.0, -INSIDE_M, *ASIDE_M)]
+    heights = find_heights(np.concatenate(rings)).reshape(len(rings), -1)
+    design = np.dstack([rings, np.ones(heights.shape)]) - [*xy.mean(axis=0), 0.0]
+    known = np.isfinite(heights)
+    if not known[:2].any(axis=1).all() or known[2:].sum() < FEWEST_TO_TELL:
+        return 0.0
+    plane = np.linalg.lstsq(design[2:][known[2:]], heights[2:][known[2:]], rcond=None)[0]
+    off = heights - design @ plane
+    error, step = np.nanmedian(off[:2], axis=1).tolist()
+    least_m = max(LEAST_STEP_M, STEP_SIGMAS * float(np.nanstd(off[2:])))
+    return error if abs(step) > least_m and abs(error) > LEAST_ERROR_M else 0.0
