@@ -56,6 +56,22 @@ def test_a_yard_is_cut_out_of_its_footprint(tmp_path, has_classes):
     assert summary.doubts == {Doubt.BARE_GROUND_INSIDE: 1}
 
 
+@pytest.mark.parametrize("has_house", [True, False])
+@pytest.mark.parametrize("seed", range(3))
+def test_classes_that_footprints_made_hide_no_bare_ground(has_house, seed, tmp_path):
+    """All points inside are of the building class, and hedges and cars outside are ground."""
+    rng = np.random.default_rng(seed)
+    xyz, _ = scan(has_house, density=2.0, seed=seed)
+    inside = shapely.intersects_xy(HOUSE, *xyz[:, :2].T)
+    for corner in rng.uniform((X - 25, Y - 25), (X + 41, Y + 37), (300, 2)):
+        is_thing = ((xyz[:, :2] > corner) & (xyz[:, :2] < corner + rng.uniform(2, 6, 2))).all(
+            axis=1
+        )
+        xyz[is_thing & ~inside, 2] = ORIGIN[2] + rng.uniform(0.5, 7.0)
+    record, _ = run(tmp_path, xyz, np.where(inside, 6, 2).astype(np.uint8))
+    assert record["status"] == ("modelled" if has_house else "no_building"), record["detail"]
+
+
 def test_a_footprint_that_is_trusted_is_roofed_over_and_that_is_said(tmp_path):
     record, _ = run(tmp_path, *scan(), footprint_trust="full")
     assert (

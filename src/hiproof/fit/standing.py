@@ -37,8 +37,13 @@ cars taken for ground.
 """
 
 MOST_ROUGH_M = 0.6
-"""Median distance (m) of places from the plane above which the ground is no plane, and nothing is
-said by it.
+"""Median distance (m) of places from the plane above which the ground is no plane."""
+
+LOW_SHARE, LOW_ROUNDS, SMOOTH_M = 0.2, 30, 0.05
+"""Share of the places that then lie below the plane: the class of the ground holds all that is not
+inside of footprints, also hedges, sheds and cars. Rounds in which it is found, and distance (m)
+below which places weigh alike. A lower plane hides more, and a higher one lies on roofs
+(benchmarks/HISTORY.md).
 """
 
 DEEPEST_M = 4.0
@@ -107,7 +112,8 @@ def ground_plane(
 ) -> np.ndarray | None:
     """Fit a plane through the ground around `outline`.
 
-    It is (3,) a, b, c of z = a x + b y + c, None where it is not known or no plane.
+    It is (3,) a, b, c of z = a x + b y + c, None where it is not known. Where much stands on the
+    ground that is called so, it lies low.
 
     `height_at` gives the ground's height (n,) at places (n, 2) in the outline's frame, NaN where it
     is unknown.
@@ -127,7 +133,21 @@ def ground_plane(
         before, selection = selection, off < max(BESIDE_PLANE_M, 2.0 * float(np.median(off)))
         if (selection == before).all():
             break
-    return plane if np.median(off) < MOST_ROUGH_M else None
+    return plane if np.median(off) < MOST_ROUGH_M else fit_low_plane(places, heights)
+
+
+def fit_low_plane(places: np.ndarray, heights: np.ndarray) -> np.ndarray:
+    """Fit a plane (3,) above LOW_SHARE of the heights (n,) at `places` (n, 3: x, y, 1).
+
+    It is that quantile's regression, by least squares with weights of the distances.
+    """
+    plane = np.array([0.0, 0.0, np.quantile(heights, LOW_SHARE)])
+    for _ in range(LOW_ROUNDS):
+        over = heights - places @ plane
+        side = np.where(over > 0, LOW_SHARE, 1 - LOW_SHARE)
+        root = np.sqrt(side / np.maximum(np.abs(over), SMOOTH_M))
+        plane = np.linalg.lstsq(root[:, None] * places, root * heights, rcond=None)[0]
+    return plane
 
 
 def places_along(areas: np.ndarray) -> np.ndarray:
