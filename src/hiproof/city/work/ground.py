@@ -306,11 +306,11 @@ def check_terrain(model: TerrainModel, ground: Terrain, xy: np.ndarray) -> str:
 
     gap, doubt = compare(xy), Doubt.TERRAIN_UNLIKE_GROUND_POINTS
     is_other, is_known = np.abs(gap) > OTHER_GROUND_M, np.isfinite(gap)
-    above = float(np.median(gap[is_other if is_other.any() else is_known])) if len(gap) else 0.0
     if not is_known.any():
         doubt, above = Doubt.TERRAIN_UNLIKE_AROUND, measure_step(model.height_at, xy)
-    elif abs(above) <= FAR_GROUND_M:
-        above = measure_step(compare, xy)
+    else:
+        above = float(np.median(gap[is_other if is_other.any() else is_known]))
+        above = above if abs(above) > FAR_GROUND_M else measure_step(compare, xy)
     if not above:
         return ""
     way = "above" if above > 0 else "below"
