@@ -174,13 +174,13 @@ def test_footprints_whose_crs_is_unknown_are_taken_to_be_in_that_of_the_clouds(
     """No file of GDAL names such a CRS at will, so a reader does."""
     from hiproof.read.outlines import vector_file
 
-    real = vector_file.read_vector_file
+    real = vector_file.read_features
 
-    def read_vector_file(*given):
+    def read_features(*given):
         meta, *others = real(*given)
         return {**meta, "crs": UNKNOWN}, *others
 
-    monkeypatch.setattr(vector_file, "read_vector_file", read_vector_file)
+    monkeypatch.setattr(vector_file, "read_features", read_features)
     square = shapely.box(*PLACE[:2], *(PLACE[:2] + 10))
     write_layer(tmp_path / "a.shp", [square], {"id": ["a"]}, "EPSG:25832")
     with pytest.warns(InputWarning, match="names a CRS that PROJ does not know"):

@@ -13,8 +13,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ...errors import InputError, InputWarning
 from ...log import count_things
 from ...masking import mask
@@ -33,8 +31,7 @@ from ...read.numbers import (
     read_year,
     warn_of_values,
 )
-from ...read.outlines.attribute_columns import make_known_condition, restore_declared_types
-from ...read.outlines.footprints import attribute_rows
+from ...read.outlines.attribute_columns import attribute_rows
 from ...read.plausible import HIGHEST_BUILDING_M
 from ...settings import ReadSettings
 from ...write.files import save_text
@@ -101,23 +98,11 @@ def table_records(path: str) -> list[dict[str, Any]]:
 
     Numbers that a CSV holds as text become numbers.
     """
-    import pyogrio
+    from ...read.outlines.vector_file import read_layer, translate_read_errors  # GDAL
 
-    from ...read.outlines.vector_file import translate_read_errors
-
-    def read(where: str | None = None) -> tuple[list[str], list[str], list[np.ndarray]]:
-        with translate_read_errors(path):
-            meta, _, _, columns = pyogrio.raw.read(path, read_geometry=False, where=where)
-        return list(meta["fields"]), list(meta["dtypes"]), columns
-
-    names, declared, columns = read()
-    columns = restore_declared_types(
-        names,
-        declared,
-        columns,
-        lambda name: read(make_known_condition(name, None))[2][names.index(name)],
-    )
-    rows = attribute_rows(names, columns, len(columns[0]) if columns else 0)
+    with translate_read_errors(path):
+        meta, numbers, _, columns, _ = read_layer(path, None, read_geometry=False)
+    rows = attribute_rows(meta["fields"], columns, len(numbers))
     left_out = SkippedValues(mask(path))
     records = [select_possible(row, str(row.get("id", "")), left_out) for row in rows]
     left_out.warn()

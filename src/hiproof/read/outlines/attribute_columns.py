@@ -6,43 +6,31 @@ pyogrio makes decimals of whole numbers and of booleans where a feature has none
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 LARGEST_EXACT = 2.0**53  # whole numbers below it are themselves as decimals
 
 
-def restore_declared_types(
-    names: Sequence[str],
-    declared: Sequence[str],
-    columns: list[np.ndarray],
-    known_of: Callable[[str], np.ndarray],
-) -> list[np.ndarray]:
-    """Return the `columns` (n,) in their `declared` types, None for no value.
+def restore_declared_type(
+    declared: str, column: np.ndarray, read_text: Callable[[], np.ndarray]
+) -> np.ndarray:
+    """Return a `column` (n,) of whole numbers or booleans in its declared type, None for no value.
 
-    These are whole numbers and booleans. `known_of` reads the values (k,) of one column again, of
-    the features that have one and in their order, for numbers that decimals do not hold.
+    `read_text` reads it again as text (n,), for numbers that decimals do not hold.
     """
-    whole = []
-    for name, kind, column in zip(names, declared, columns, strict=True):
-        if not (
-            kind.startswith(("int", "uint", "bool")) and np.issubdtype(column.dtype, np.floating)
-        ):
-            whole.append(shortest(column) if column.dtype == np.float32 else column)
-            continue
-        is_known = np.isfinite(column)
-        set_values = column[is_known]
-        if (np.abs(set_values) >= LARGEST_EXACT).any() and len(repeat := known_of(name)) == len(
-            set_values
-        ):
-            set_values = repeat
-        values = np.full(len(column), None, dtype=object)
-        values[is_known] = [
-            bool(value) if kind == "bool" else int(value) for value in set_values.tolist()
-        ]
-        whole.append(values)
-    return whole
+    is_whole = declared.startswith(("int", "uint", "bool"))
+    if not (is_whole and np.issubdtype(column.dtype, np.floating)):
+        return shortest(column) if column.dtype == np.float32 else column
+    is_known = np.isfinite(column)
+    values = column[is_known].tolist()
+    if (np.abs(values) >= LARGEST_EXACT).any():
+        values = [text or value for text, value in zip(read_text()[is_known], values, strict=True)]
+    result = np.full(len(column), None, dtype=object)
+    result[is_known] = [bool(v) if declared == "bool" else int(v) for v in values]
+    return result
 
 
 def shortest(column: np.ndarray) -> np.ndarray:
@@ -56,13 +44,28 @@ def shortest(column: np.ndarray) -> np.ndarray:
     return np.array([float(str(value)) for value in column])
 
 
-def make_known_condition(name: str, where: str | None) -> str:
-    """Return the condition `where`, if any, and that the attribute `name` is set.
+def attribute_rows(names: list[str], columns: list[np.ndarray], count: int) -> list[dict[str, Any]]:
+    """Return a dictionary of plain values a feature, without None and NaN."""
+    values = [[plain_value(value) for value in column.tolist()] for column in columns]
+    return [
+        {
+            name: column[row]
+            for name, column in zip(names, values, strict=True)
+            if column[row] is not None
+        }
+        for row in range(count)
+    ]
 
-    >>> make_known_condition("year", "year < 1950 or listed")
-    '(year < 1950 or listed) and "year" is not null'
-    """
-    return (f"({where}) and " if where else "") + f"{quote(name)} is not null"
+
+def plain_value(value: Any) -> Any:
+    """Convert a value to JSON's: NaN to None, dates and bytes (hex) to text, arrays to lists."""
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, float) and not np.isfinite(value):
+        return None
+    if hasattr(value, "isoformat"):
+        return value.isoformat()
+    return value.hex() if isinstance(value, bytes) else value
 
 
 def quote(name: str) -> str:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,7 @@ from ..crs import (
 from ..crs.operations import find_operation, warn_if_coarse
 from ..crs.positions import format_box, refuse_degrees
 from ..names import READING
+from .attribute_columns import attribute_rows
 from .database import is_database, read_table, table_crs
 from .geoparquet import is_parquet
 from .polygons import Features, is_surface, simple_polygons
@@ -98,13 +100,18 @@ def footprint_crs(path: str | Path, layer: str | int | None = None) -> CRS | Non
     """Return the CRS that a file names, or None; raises InputError as `read_footprints`."""
     if is_database(path):
         return plan_crs(table_crs(str(path)), path)
+    return plan_crs(find_reader(path).read_crs(path, layer), path)
+
+
+def find_reader(path: str | Path) -> ModuleType:
+    """Return the module that reads files of this kind."""
     if is_parquet(path):
-        from .geoparquet import parquet_crs
+        from . import geoparquet
 
-        return plan_crs(parquet_crs(path), path)
-    from .vector_file import vector_file_crs  # GDAL, which takes long to load
+        return geoparquet
+    from . import vector_file  # GDAL, which takes long to load
 
-    return plan_crs(vector_file_crs(path, layer), path)
+    return vector_file
 
 
 def plan_crs(text: str | CRS | None, path: str | Path) -> CRS | None:
@@ -128,7 +135,7 @@ def read_features(
     remember(str(path))
     if is_database(path):
         return read_table(str(path), where)
-    features = read_file(
+    features: Features = find_reader(path).read_features(
         path, layer, where, lambda crs: bbox and box_in(plan_crs(crs, path), bbox, bbox_crs)
     )
     meta, _, geometries, _ = features
@@ -140,22 +147,6 @@ def read_features(
             "close the lines first"
         )
     return features
-
-
-def read_file(
-    path: str | Path,
-    layer: str | int | None,
-    where: str | None,
-    make_box: Callable[[Any], Box | None],
-) -> Features:
-    """Read a file's features by its kind, in the box that `make_box` gives in its CRS."""
-    if is_parquet(path):
-        from .geoparquet import read_parquet
-
-        return read_parquet(path, layer, where, make_box)
-    from .vector_file import read_vector_file  # GDAL, which takes long to load
-
-    return read_vector_file(path, layer, where, make_box)
 
 
 def refuse_nothing(
@@ -187,30 +178,6 @@ def box_in(crs: CRS | None, bbox: Box, bbox_crs: CRS | None) -> Box:
     if not names_place(crs):
         return tuple(np.array(bbox) * compare_units(bbox_crs, crs))
     return make_transformer(bbox_crs, crs).transform_bounds(*bbox)
-
-
-def attribute_rows(names: list[str], columns: list[np.ndarray], count: int) -> list[dict[str, Any]]:
-    """Return a dictionary of plain values a feature, without None and NaN."""
-    values = [[plain_value(value) for value in column.tolist()] for column in columns]
-    return [
-        {
-            name: column[row]
-            for name, column in zip(names, values, strict=True)
-            if column[row] is not None
-        }
-        for row in range(count)
-    ]
-
-
-def plain_value(value: Any) -> Any:
-    """Convert a value to JSON's: NaN to None, dates and bytes (hex) to text, arrays to lists."""
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    if isinstance(value, float) and not np.isfinite(value):
-        return None
-    if hasattr(value, "isoformat"):
-        return value.isoformat()
-    return value.hex() if isinstance(value, bytes) else value
 
 
 def feature_ids(

@@ -10,38 +10,35 @@ from __future__ import annotations
 
 import io
 import json
-import warnings
+import sqlite3
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
+from datetime import time, timedelta
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
 import numpy as np
-import pyogrio
 import shapely
-from pyogrio.errors import FeatureError
 from pyproj import CRS
 
 from ...errors import InputError
 from ...extras import import_extra
 from ..crs import read_named_crs
 from ..remote import is_url, open_binary
-from .attribute_columns import shortest
+from .attribute_columns import plain_value, quote, shortest
 from .polygons import Features, decode_geometries
 
-# Columns of the table that answers a condition, of names that no file has.
-ROW, FID = "hiproof_row", "hiproof_fid"
 
-
-def parquet_crs(path: str | Path) -> CRS | None:
+def read_crs(path: str | Path, layer: str | int | None) -> CRS | None:
     """Return the CRS that a GeoParquet file names, None where it leaves it open."""
     with open_parquet(path) as file:
         return geometry_column(file, path).crs
 
 
-def read_parquet(
+def read_features(
     path: str | Path,
     layer: str | int | None,
     where: str | None,
@@ -66,77 +63,58 @@ def read_parquet(
         names = [name for name in file.schema_arrow.names if name not in without]
         extent = None if box is None else shapely.box(*box)
         table, numbers = read_rows(file, column, names, extent)
-    if where and len(table):
-        chosen = select_rows(table.select(names), where, path)
-        table, numbers = table.take(chosen), numbers[chosen]
-    meta = {"fields": names, "crs": column.crs, "total_bounds": column.bounds}
     columns = [convert_values(table.column(name)) for name in names]
+    if where and len(table):
+        chosen = select_rows(names, columns, where, path)
+        table, numbers = table.take(chosen), numbers[chosen]
+        columns = [values[chosen] for values in columns]
+    meta = {"fields": names, "crs": column.crs, "total_bounds": column.bounds}
     return meta, numbers, geometries_in(table, column), columns
 
 
 def convert_values(column: Any) -> np.ndarray:
     """Return plain values (n,) of a column, or None; lists and structs become JSON text."""
+    import pyarrow
     from pyarrow import types
 
     values = np.empty(len(column), object)
-    if types.is_dictionary(column.type):
-        column = column.cast(column.type.value_type)
-    kind = column.type
-    if types.is_nested(kind):
-        texts = [None if v is None else json.dumps(v, default=str) for v in column.to_pylist()]
-        values[:] = texts
-    elif types.is_float32(kind):
+    if types.is_float32(column.type):
         values[:] = shortest(np.array(column.to_numpy(), np.float32))
-    elif types.is_decimal(kind):
-        values[:] = column.cast("float64").to_pylist()
-    elif types.is_timestamp(kind):
-        import pyarrow
-
+        return values
+    if types.is_timestamp(column.type):
         # nanoseconds are more than Python's own times hold
-        values[:] = column.cast(pyarrow.timestamp("us", kind.tz), safe=False).to_pylist()
-    elif types.is_duration(kind) or types.is_time(kind):
-        values[:] = [None if v is None else str(v) for v in column.to_pylist()]
-    else:
-        values[:] = column.to_pylist()
+        column = column.cast(pyarrow.timestamp("us", column.type.tz), safe=False)
+    values[:] = [convert_value(value) for value in column.to_pylist()]
     return values
 
 
-def select_rows(table: Any, where: str, path: str | Path) -> np.ndarray:
-    """Return the numbers of the rows of `table` that meet a condition in SQL (by SQLite)."""
-    import pyarrow
+def convert_value(value: Any) -> Any:
+    if isinstance(value, (dict, list)):
+        return json.dumps(value, default=str)
+    if isinstance(value, Decimal):
+        return float(value)
+    return str(value) if isinstance(value, (time, timedelta)) else value
 
-    known = {name: plain_column(table.column(name)) for name in table.column_names}
-    known[ROW] = pyarrow.array(np.arange(len(table)))
-    file = io.BytesIO()
+
+def select_rows(
+    names: Sequence[str], columns: Sequence[np.ndarray], where: str, path: str | Path
+) -> np.ndarray:
+    """Return the numbers of the rows of `columns` (n,) that meet a condition in SQL (SQLite's)."""
+    listed = ", ".join(["hiproof_row integer primary key", *map(quote, names)])
+    places = ", ".join("?" * (1 + len(names)))
+    numbers = range(len(columns[0]) if columns else 0)
+    rows = zip(numbers, *(map(plain_value, column) for column in columns), strict=True)
     try:
-        pyogrio.raw.write_arrow(
-            pyarrow.table(known), file, layer="rows", driver="GPKG", geometry_name=None, FID=FID
-        )
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # a file in memory has no name, and so no suffix
-            _, _, _, (rows,) = pyogrio.raw.read(
-                file.getvalue(), where=where, columns=[ROW], read_geometry=False
-            )
-    except (FeatureError, ValueError) as error:
-        told = str(error).rpartition(f"{where}: ")[2]
+        with closing(sqlite3.connect(":memory:")) as database:
+            database.execute(f"create table features ({listed})")
+            database.executemany(f"insert into features values ({places})", rows)
+            sql = f"select hiproof_row from features where {where} order by hiproof_row"
+            return np.array(database.execute(sql).fetchall(), np.int64).reshape(-1)
+    except sqlite3.Error as error:
         raise InputError(
-            f"expected --where in SQL on the attributes of {path} "
-            f"({', '.join(table.column_names) or 'none'}), got: {told}; use these names"
+            f"expected --where in SQL on the attributes of {path} ({', '.join(names) or 'none'}), "
+            f"got: {error}; use these names"
         ) from error
-    return np.sort(rows)
-
-
-def plain_column(column: Any) -> Any:
-    """Convert a column of a nested or rare type to text, as GDAL's tables do."""
-    import pyarrow
-    from pyarrow import types
-
-    kind = column.type
-    rare = types.is_nested(kind) or types.is_dictionary(kind) or types.is_decimal(kind)
-    rare |= types.is_duration(kind) or types.is_time(kind) or types.is_null(kind)
-    if not rare:
-        return column
-    return pyarrow.array(convert_values(column).tolist(), from_pandas=True)
 
 
 MAGIC = b"PAR1"  # the first bytes of every Parquet file

@@ -19,7 +19,7 @@ from pyogrio.util import vsi_path
 from ...errors import InputError, explain_unreadable, warn
 from ...frames import Box
 from ..remote import is_url
-from .attribute_columns import make_known_condition, restore_declared_types
+from .attribute_columns import restore_declared_type
 from .polygons import Features, decode_geometries
 
 SLASHED_DATE = re.compile(r"^(\d{1,5})/(\d\d)/(\d\d)")  # how GDAL writes a date as text
@@ -32,7 +32,7 @@ READ_ERRORS = (ValueError, OverflowError, FieldError)
 def read_layer(
     path: str, layer: str | int | None, **chosen: Any
 ) -> tuple[dict[str, Any], np.ndarray, np.ndarray, list[np.ndarray], list[str]]:
-    """Read pyogrio's metadata, numbers, WKB and columns of a layer.
+    """Read pyogrio's metadata, numbers, WKB and columns of a layer, in their declared types.
 
     The names of the attributes that were read as text come with them. `chosen` are pyogrio's own
     options that choose among the features.
@@ -40,27 +40,24 @@ def read_layer(
     read = partial(
         pyogrio.raw.read, path, layer=layer, return_fids=True, datetime_as_string=True, **chosen
     )
+    odd: list[str] = []
     try:
-        return (*read(), [])
+        meta, numbers, wkb, columns = read()
     except READ_ERRORS as error:
-        info = pyogrio.read_info(path, layer=layer)
-        odd = (
-            []
-            if "SQL" in str(error)
-            else [name for name in info["fields"] if not is_readable(path, layer, name)]
-        )
+        fields = pyogrio.read_info(path, layer=layer)["fields"]
+        if "SQL" not in str(error):
+            odd = [name for name in fields if not is_readable(path, layer, name)]
         if not odd:
             raise
-    meta, numbers, wkb, columns = read(columns=[name for name in info["fields"] if name not in odd])
-    columns_by_name = dict(
-        zip(meta["fields"], zip(columns, meta["dtypes"], strict=True), strict=True)
-    )
-    columns_by_name |= {
-        name: (column_as_text(path, info["layer_name"], name, numbers), "object") for name in odd
+        meta, numbers, wkb, columns = read(columns=[name for name in fields if name not in odd])
+    read_text = partial(column_as_text, path, layer, numbers)
+    values = {
+        name: restore_declared_type(kind, column, partial(read_text, name))
+        for name, kind, column in zip(meta["fields"], meta["dtypes"], columns, strict=True)
     }
-    names = [name for name in info["fields"] if name in columns_by_name]
-    meta = {**meta, "fields": names, "dtypes": [columns_by_name[name][1] for name in names]}
-    return meta, numbers, wkb, [columns_by_name[name][0] for name in names], odd
+    values |= {name: read_text(name) for name in odd}
+    names = [name for name in fields if name in values] if odd else list(values)
+    return {**meta, "fields": names}, numbers, wkb, [values[name] for name in names], odd
 
 
 def is_readable(path: str, layer: str | int | None, name: str) -> bool:
@@ -74,9 +71,12 @@ def is_readable(path: str, layer: str | int | None, name: str) -> bool:
     return True
 
 
-def column_as_text(path: str, layer: str, name: str, numbers: np.ndarray) -> np.ndarray:
+def column_as_text(
+    path: str, layer: str | int | None, numbers: np.ndarray, name: str
+) -> np.ndarray:
     """Return an attribute (n,) of these features as text, broken UTF-8 replaced."""
-    source = virtual_layer(path, layer, text=name)
+    layer_name = pyogrio.read_info(path, layer=layer)["layer_name"]
+    source = virtual_layer(path, layer_name, text=name)
     try:
         _, _, _, columns = pyogrio.raw.read(
             source, fids=numbers, read_geometry=False, encoding="latin-1"
@@ -150,7 +150,7 @@ def virtual_layer(path: str, layer: str, geometry: str = "", text: str = "") -> 
     return ElementTree.tostring(root, encoding="unicode")
 
 
-def read_vector_file(
+def read_features(
     path: str | Path,
     layer: str | int | None,
     where: str | None,
@@ -161,12 +161,10 @@ def read_vector_file(
     Geometries are shapely's, None where a feature has none. `make_box` gives the box to read in the
     layer's CRS.
     """
-    with translate_read_errors(path):
-        source, layer = find_source(str(path), choose_layer(path, layer))
-        info = pyogrio.read_info(source, layer=layer)
-    selection = {"where": where, "bbox": make_box(info["crs"])}
+    source, layer, info = open_layer(path, layer)
+    box = make_box(info["crs"])
     with translate_read_errors(path, info):
-        meta, numbers, wkb, columns, as_text = read_layer(source, layer, **selection)
+        meta, numbers, wkb, columns, as_text = read_layer(source, layer, where=where, bbox=box)
     if as_text:
         names = ", ".join(as_text)
         warn(path, f"read as text, for a value does not fit the attribute's type: {names}")
@@ -175,26 +173,22 @@ def read_vector_file(
             f"expected polygons in {path}, got a table without geometry; name another file or layer"
         )
 
-    def read_column(name: str) -> np.ndarray:
-        # of all columns: in some formats those left out are empty to the condition as well
-        known = {**selection, "where": make_known_condition(name, where)}
-        with translate_read_errors(path, info):
-            entries, *_, values, _ = read_layer(source, layer, read_geometry=False, **known)
-        return values[list(entries["fields"]).index(name)]
-
-    return (
-        {**meta, "total_bounds": info["total_bounds"]},
-        numbers,
-        decode_geometries(wkb),
-        restore_declared_types(meta["fields"], meta["dtypes"], columns, read_column),
-    )
+    meta = {**meta, "total_bounds": info["total_bounds"]}
+    return meta, numbers, decode_geometries(wkb), columns
 
 
-def vector_file_crs(path: str | Path, layer: str | int | None) -> str | None:
+def read_crs(path: str | Path, layer: str | int | None) -> str | None:
     """Return the CRS that a layer names, in GDAL's form."""
+    return open_layer(path, layer)[2]["crs"]
+
+
+def open_layer(
+    path: str | Path, layer: str | int | None
+) -> tuple[str, str | int | None, dict[str, Any]]:
+    """Return what pyogrio can open in place of `path`, the layer there, and its metadata."""
     with translate_read_errors(path):
         source, layer = find_source(str(path), choose_layer(path, layer))
-        return pyogrio.read_info(source, layer=layer)["crs"]
+        return source, layer, pyogrio.read_info(source, layer=layer)
 
 
 def choose_layer(path: str | Path, layer: str | int | None) -> str | int | None:
