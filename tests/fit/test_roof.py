@@ -8,8 +8,8 @@ import shapely
 
 from hiproof.compose import compose
 from hiproof.fit.prices import compute_unit
-from hiproof.fit.roof import add, fit_building, improve_all, read_parts, start_roof
-from hiproof.fit.roof.accept import fit_roof, try_move
+from hiproof.fit.roof import add, fit_building, read_parts, start_roof
+from hiproof.fit.roof.accept import LOOP_ROUNDS, fit_roof, improve, try_move
 from hiproof.fit.roof.draw import (
     compute_height,
     compute_heights,
@@ -56,6 +56,11 @@ def begin_roof(kind, seed=0):
     roof = start_roof(volumes, scene, site)
     fit_roof(roof, site, 2)
     return roof, site, plan_outline, (volumes, scene, site)
+
+
+def improve_all(roof, site):
+    asked, drawing = np.ones(len(roof.sides), np.bool_), make_drawing(len(roof.sides))
+    improve(roof, make_tables_like(roof), site, drawing, asked, LOOP_ROUNDS)
 
 
 def list_all_moves(roof, site):
@@ -145,7 +150,7 @@ def test_heights_at_once_are_the_heights_one_by_one(kind):
 def test_improving_a_roof_never_makes_it_dearer(kind):
     start, site, _, search = begin_roof(kind)
     roof = start_roof(*search)
-    improve_all(roof, make_tables_like(roof), site, make_drawing(len(roof.sides)))
+    improve_all(roof, site)
     assert price(roof, site) <= price(start, site)
 
 
@@ -163,7 +168,7 @@ def test_a_slope_below_zero_names_the_parts_that_the_same_planes_have_otherwise(
     """A plane that falls to the other side faced the wrong way, and its house was simplified."""
     roof, site, outline, _ = begin_roof(kind)
     plan = lay_out_plan(*scan_compound(kind))
-    improve_all(roof, make_tables_like(roof), site, make_drawing(len(roof.sides)))
+    improve_all(roof, site)
     parts = read_parts(roof, site, outline, plan, ())
     slopes = roof.slopes[roof.slopes >= 0]
     roof.values[np.unique(slopes)] *= -1.0

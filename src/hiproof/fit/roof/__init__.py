@@ -14,7 +14,6 @@ site        what a roof has to explain: points, cells, the outline and its lines
 start       the tables of the volumes that the search found
 copies      compiled: volumes copied along a side to where points are unexplained
 add         volumes added where points are unexplained
-beside      how far the points lie beside the outline
 deviations  compiled: how well points determine unknowns and sides
 regions     which polygons each volume roofs
 names       from volumes to planes and sides by place
@@ -34,7 +33,7 @@ from ...primitives.catalogue import CATALOGUE, CURVED
 from ...primitives.family import name_among
 from ...read.plausible import is_plausible
 from ...settings import Settings
-from ..prices import UNKNOWN_UNITS, compute_unit
+from ..prices import compute_unit
 from ..shapes.clamp import clamp_parts
 from ..shapes.composite import combine_parts
 from ..shapes.curved import fit_curved_shapes
@@ -50,16 +49,15 @@ from ..union.search import SEARCH_POINTS, find_volumes
 from ..union.whole import Whole
 from .accept import LOOP_ROUNDS, improve
 from .add import add_volumes
-from .beside import estimate_shift
 from .deviations import estimate_covariance, estimate_side_sigmas, find_anchored
-from .draw import Drawing, draw_whole_roof, make_drawing
+from .draw import draw_whole_roof, make_drawing
 from .names import cut_sides, find_axes, read_planes, read_sides
 from .parts import name_planes
 from .price import Site
 from .regions import list_places
 from .site import make_site
 from .start import make_roof, put_on_walls
-from .tables import VOLUME_COUNT, Tables, copy_tables, make_tables_like
+from .tables import VOLUME_COUNT, Tables, make_tables_like
 
 __all__ = ["BuildingFit", "fit_building"]
 
@@ -121,34 +119,21 @@ def name_volumes(
     keeps_shapes = bool(types) and not {*CATALOGUE} <= {*types, *CURVED}
     site = make_site(scene, plan_outline, unit, plan.border, keeps_shapes)
     roof = start_roof(volumes, scene, site)
-    roof, site = improve_beside(roof, site, Whole(scene, plan, outline))
+    improve_roof(roof, site, Whole(scene, plan, outline))
     return read_parts(roof, site, plan_outline, plan, types)
 
 
-def improve_beside(roof: Tables, site: Site, whole: Whole) -> tuple[Tables, Site]:
-    """Improve a roof, also with its points moved to where its eaves are level, if that is cheaper.
+def improve_roof(roof: Tables, site: Site, whole: Whole) -> None:
+    """Improve a roof until no move saves.
 
     Volumes are added where points of the `whole` are unexplained, if the search has not seen all of
-    them. Returns the roof and the site that it explains.
+    them.
     """
     trial, drawing = make_tables_like(roof), make_drawing(len(roof.sides))
-    cost = improve_all(roof, trial, site, drawing)
+    improve(roof, trial, site, drawing, np.ones(len(roof.sides), np.bool_), LOOP_ROUNDS)
     is_thinned = whole.scene.n > SEARCH_POINTS  # else the search has seen every point
     if is_thinned and (added := add_volumes(roof, trial, site, drawing, whole)).any():
-        cost = improve(roof, trial, site, drawing, added, LOOP_ROUNDS)
-    shift = estimate_shift(roof, site)
-    if not shift.any():
-        return roof, site
-    moved = site._replace(x=site.x - shift[0], y=site.y - shift[1])
-    other = make_tables_like(roof)
-    copy_tables(roof, other)
-    other_cost = improve_all(other, trial, moved, drawing) + 2 * UNKNOWN_UNITS * site.unit
-    return (other, moved) if other_cost < cost else (roof, site)
-
-
-def improve_all(roof: Tables, trial: Tables, site: Site, drawing: Drawing) -> float:
-    """Improve all volumes of a roof until no move saves. Returns its price (points)."""
-    return improve(roof, trial, site, drawing, np.ones(len(roof.sides), np.bool_), LOOP_ROUNDS)
+        improve(roof, trial, site, drawing, added, LOOP_ROUNDS)
 
 
 def start_roof(volumes: np.ndarray, scene: Scene, site: Site) -> Tables:
