@@ -145,7 +145,7 @@ def test_a_chain_asks_the_next_where_one_does_not_know(tmp_path):
     [
         ("missing", "no such file"),
         ("text", "that GDAL reads"),
-        ("empty", "that GDAL reads"),
+        ("empty", "an empty file"),
         ("unplaced", "without position"),
     ],
 )
