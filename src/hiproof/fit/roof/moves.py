@@ -64,7 +64,6 @@ SIDE_MOVE_M = 1.6  # Furthest (m) that the middle of a side moves to another lin
 LINE_COSINE = 0.94  # Cosine of the angle between a side and the line to which it moves.
 SAME_DIRECTION = 0.97  # The same of sides of volumes that merge.
 FACING_COSINE = 0.9  # The same of a plane and the side that it faces.
-SQUARE_COSINE = 0.02  # The same of planes of square wings, which end in gables.
 ALIKE_COSINE = 0.7  # The same of a plane and one of another volume that may end it instead.
 BESIDE_CORNER_M = 0.1  # Distance (m) outside a volume of the middle of a wall over its corner.
 BESIDE_WALL_M = 0.3  # Distance (m) from the middle of a wall of a line that is meant to be its own.
@@ -162,10 +161,9 @@ def list_taken_planes(roof, site, j, k, moves, count):
         if roof.slopes[j, p] < 0:
             continue
         a, b, _ = read_line(roof, roof.plane_lines[j, p])
-        is_alike = is_square = False
+        is_alike = False
         for q in range(roof.n_planes[k]):
             c, d, _ = read_line(roof, roof.plane_lines[k, q])
-            is_square |= roof.slopes[k, q] >= 0 and abs(a * c + b * d) < SQUARE_COSINE
             if roof.slopes[k, q] >= 0 and a * c + b * d > least:
                 is_alike |= a * c + b * d > FACING_COSINE
                 is_one = roof.heights[j, p] == roof.heights[k, q]
@@ -174,7 +172,7 @@ def list_taken_planes(roof, site, j, k, moves, count):
                     count = write_move(moves, count, ONE_PLANE, k, q, j, p)
         row = roof.planes[j, p]
         is_above = row[0] * x + row[1] * y + row[2] >= top
-        if is_alike or is_square or not (is_above and has_room):
+        if is_alike or not (is_above and has_room):
             continue
         best, most = 0, -1.0
         for s in range(N_SIDES):
