@@ -50,10 +50,10 @@ def put_plainly(text: str) -> str:
     return NO_TEXT.sub("bytes that are no text", OS_ERROR.sub(name, text))
 
 
-def explain_unreadable(path: str | os.PathLike[str]) -> str:
+def explain_fault(path: str | os.PathLike[str]) -> str:
     """Return why no program can read a file of this machine, "" where nothing tells.
 
-    >>> explain_unreadable("nowhere/at.all")
+    >>> explain_fault("nowhere/at.all")
     'no such file'
     """
     try:

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import InputError, explain_unreadable, warn
+from ..errors import InputError, explain_fault, warn
 from ..extras import import_extra
 from ..log import count_things
 
@@ -120,7 +120,7 @@ def read_year(path: str) -> Weather:
     except (OSError, ValueError, KeyError, IndexError, TypeError, StopIteration) as error:
         raise InputError(
             f"expected weather of a typical year as EPW, TMY3 or PVGIS in {path}, got "
-            f"{explain_unreadable(path) or explain(error)}; check the file"
+            f"{explain_fault(path) or explain(error)}; check the file"
         ) from error
     refuse_other_hours(weather, path)
     refuse_missing_hours(weather, path)

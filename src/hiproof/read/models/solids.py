@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError, explain_unreadable
+from ...errors import InputError, explain_fault
 from ...frames import METRES, Units
 from ...log import count_things
 from ...model import WALL, Face, Solid
@@ -183,7 +183,7 @@ def citygml_solids(
     except (etree.XMLSyntaxError, OSError) as error:
         raise InputError(
             f"expected well-formed CityGML in {path}, got "
-            f"{explain_unreadable(path) or f'{error}; the file is damaged or cut off'}"
+            f"{explain_fault(path) or f'{error}; the file is damaged or cut off'}"
         ) from error
     if members == 0:
         raise InputError(

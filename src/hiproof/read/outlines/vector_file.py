@@ -16,7 +16,7 @@ import pyogrio
 from pyogrio.errors import DataLayerError, DataSourceError, FeatureError, FieldError, GeometryError
 from pyogrio.util import vsi_path
 
-from ...errors import InputError, explain_unreadable, warn
+from ...errors import InputError, explain_fault, warn
 from ...frames import Box
 from ..remote import is_url
 from .attribute_columns import restore_declared_type
@@ -238,7 +238,7 @@ def unreadable(path: str | Path, error: Exception) -> InputError:
     is_local = not is_url(path) and not str(path).startswith(("/vsi", "PG:"))
     # what follows is advice on GDAL's own options
     reason = str(error).partition("; It might help")[0].rstrip(".")
-    reason = (is_local and explain_unreadable(path)) or reason
+    reason = (is_local and explain_fault(path)) or reason
     return InputError(
         f"expected a vector file that GDAL reads (GeoPackage, GeoJSON, Shapefile, ...) at {path}, "
         f"got: {reason}; check the file, or convert it with ogr2ogr"

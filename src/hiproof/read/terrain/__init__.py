@@ -12,7 +12,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ...errors import InputError, explain_unreadable
+from ...errors import InputError, explain_fault
 from ...frames import Units
 from .raster import RasterTerrain, import_rasterio
 
@@ -80,6 +80,6 @@ def read_terrain(path: str | Path, crs: Any = None, units: Units | None = None) 
     """
     import_rasterio()
     is_local = "://" not in str(path) and not str(path).startswith("/vsi")
-    if is_local and (reason := explain_unreadable(path)):
+    if is_local and (reason := explain_fault(path)):
         raise InputError(f"expected a terrain model at {path}, got {reason}; check the path")
     return RasterTerrain(path, crs, units)
