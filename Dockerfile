@@ -8,7 +8,7 @@ ENV NUMBA_CPU_NAME=x86-64-v3 NUMBA_CPU_FEATURES=""
 COPY . /source
 RUN python -m venv /opt/hiproof \
  && /opt/hiproof/bin/pip install --no-cache-dir "/source[all]" \
- && /opt/hiproof/bin/hiproof warm --all
+ && /opt/hiproof/bin/hiproof warm
 
 FROM python:3.13-slim
 # what GDAL's and rasterio's wheels expect of the system

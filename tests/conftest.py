@@ -13,7 +13,6 @@ from hiproof import log, masking
 from hiproof.city import run as city_run
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.city.work import solve
-from hiproof.city.work.tasks import WITHOUT_FOOTPRINTS
 from hiproof.city.work.warm import make_ready
 from hiproof.compiled import news
 from hiproof.garbage import RARELY
@@ -34,7 +33,7 @@ def pytest_configure(config):
         signal.signal(signal.SIGINT, signal.default_int_handler)
     if getattr(config.option, "numprocesses", None) and not hasattr(config, "workerinput"):
         news.listener = news.Lines(print)
-        make_ready(WITHOUT_FOOTPRINTS)
+        make_ready()
 
 
 def pytest_collection_finish():

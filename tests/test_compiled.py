@@ -192,16 +192,22 @@ def test_code_for_a_kind_of_processors_is_loaded_on_each_of_them(town, monkeypat
     script = """
 import llvmlite.binding
 llvmlite.binding.get_host_cpu_name = lambda: {host!r}
-from hiproof.city.work.warm import mark, read_processor
+from pathlib import Path
+from hiproof.city.work import warm
+from hiproof.compiled import kept
 from test_compiled import is_loaded
 from town.outer import answer
-print(mark("solid", "stamp", read_processor()), answer(10), is_loaded(answer))
+times = []
+kept.list_folders = lambda sources: (Path({folder!r}),)
+warm.compile_halves = lambda: not times.append(1)
+warm.make_ready()
+print(len(times), answer(10), is_loaded(answer))
 """
     first_host, second_host = (
-        run(town, script.format(host=host)).split() for host in ("here", "there")
+        run(town, script.format(host=host, folder=str(town / "marks"))).split()
+        for host in ("here", "there")
     )
-    assert first_host[1:] == ["61", "False"] and second_host[1:] == ["61", "True"]
-    assert first_host[0] == second_host[0]
+    assert first_host == ["1", "61", "False"] and second_host == ["0", "61", "True"]
 
 
 def test_a_changed_line_makes_what_stands_on_it_new_and_removes_the_old(town):
@@ -327,71 +333,80 @@ def test_a_stamp_changes_with_any_source_it_stands_on_and_with_no_other(town, mo
     assert not set(compute_stamps().values()) & set(new.values())
 
 
-def test_what_is_kept_is_marked_once_and_again_after_a_change(tmp_path, monkeypatch):
-    runs = []
-    monkeypatch.setattr(
-        warm, "compiled_pieces", lambda left: (piece for piece in left if not runs.append(piece))
-    )
+@pytest.fixture
+def compiled_beforehand(tmp_path, monkeypatch):
+    """The names of functions of each time that all is compiled beforehand, as if it were."""
+    times = []
+
+    def compile_halves():
+        times.append({f"functions.of_{len(times)}"})
+        news.ready.update(times[-1])
+        return True
+
+    monkeypatch.setattr(warm, "compile_halves", compile_halves)
     monkeypatch.setattr(kept, "list_folders", lambda sources: (tmp_path / "kept",))
+    monkeypatch.setattr(news, "ready", set())
     kept.remove_outdated.cache_clear()
-    for stamped in ("a", "a", "b", "b"):
+    kept.warn_not_kept.cache_clear()
+    return times
+
+
+def test_what_runs_call_is_compiled_once_and_again_after_a_change(
+    tmp_path, compiled_beforehand, monkeypatch
+):
+    for stamped, times in (("a", 1), ("a", 1), ("b", 2), ("b", 2)):
         monkeypatch.setattr(warm, "compute_common_stamp", lambda stamped=stamped: stamped)
-        warm.make_ready(["solid"])
-    warm.make_ready(["solid", "single"])
-    assert runs == ["solid", "solid", "single"]
-    assert len(files_in(tmp_path)) == 2
+        warm.make_ready()
+        assert len(compiled_beforehand) == times
+    assert len(files_in(tmp_path)) == 1
 
 
-def test_a_mark_that_cannot_be_kept_or_read_ends_no_run(tmp_path, monkeypatch):
-    def full(path, text, encoding):
+def test_a_mark_that_cannot_be_kept_or_read_ends_no_run(tmp_path, compiled_beforehand, monkeypatch):
+    def full(path, data):
         path.touch()
         raise OSError(errno.ENOSPC, "no space left on device")
 
-    monkeypatch.setattr(warm, "compiled_pieces", lambda left: left)
-    monkeypatch.setattr(kept, "list_folders", lambda sources: (tmp_path,))
-    kept.warn_not_kept.cache_clear()
     with monkeypatch.context() as patch, pytest.warns(NotKeptWarning):
-        patch.setattr(Path, "write_text", full)
-        warm.make_ready(["solid"])
+        patch.setattr(Path, "write_bytes", full)
+        warm.make_ready()
     assert files_in(tmp_path) == []
-    warm.make_ready(["solid"])
-    (product,) = tmp_path.glob("*.nbc")
-    product.write_bytes(b"\xff\xfe damaged")
-    warm.make_ready(["solid"])
+    warm.make_ready()
+    (mark,) = tmp_path.rglob("*.nbc")
+    mark.write_bytes(b"\xff\xfe damaged")
+    warm.make_ready()
+    assert len(compiled_beforehand) == 3
 
 
-def test_functions_of_pieces_compiled_before_are_not_announced_again(tmp_path, monkeypatch):
-    def compiled_pieces(remaining):
-        for piece in remaining:
-            news.ready.add(f"functions.of_{piece}")
-            yield piece
-
-    messages = []
-    monkeypatch.setattr(warm, "compiled_pieces", compiled_pieces)
-    monkeypatch.setattr(kept, "list_folders", lambda sources: (tmp_path,))
-    monkeypatch.setattr(news, "ready", set())
-    monkeypatch.setattr(news, "listener", lambda done, total: messages.append(done))
-    warm.make_ready(["solid", "points"])
+def test_functions_compiled_before_are_not_announced_again(compiled_beforehand):
+    warm.make_ready()
     news.ready.clear()  # another process, later
-    messages.clear()
-    warm.make_ready(["solid", "points", "single"])
-    assert messages == [2]
-    news.ready.clear()
-    warm.make_ready(["single"])
-    assert messages == [2] and "functions.of_single" in news.ready
+    warm.make_ready()
+    assert [news.ready] == compiled_beforehand
 
 
-def test_where_nothing_can_be_kept_nothing_is_compiled_beforehand(tmp_path, monkeypatch):
+def test_where_nothing_can_be_kept_nothing_is_compiled_beforehand(
+    tmp_path, compiled_beforehand, monkeypatch
+):
     (tmp_path / "file").touch()
-    monkeypatch.setattr(warm, "compiled_pieces", lambda left: pytest.fail("compiled for nothing"))
     monkeypatch.setattr(kept, "list_folders", lambda sources: (tmp_path / "file" / "folder",))
-    kept.warn_not_kept.cache_clear()
     with pytest.warns(NotKeptWarning, match="NUMBA_CACHE_DIR"):
-        warm.make_ready(["solid"])
+        warm.make_ready()
+    assert compiled_beforehand == []
 
 
-def test_a_piece_that_fails_leaves_the_others_to_be_compiled():
-    assert list(warm.compiled_pieces(iter(["no such piece", "points"]))) == ["points"]
+def test_what_failed_beforehand_is_tried_again(tmp_path, monkeypatch):
+    monkeypatch.setattr(kept, "list_folders", lambda sources: (tmp_path,))
+    monkeypatch.setattr(warm, "__name__", "no.such.module")
+    for _ in range(2):
+        warm.make_ready()
+        assert files_in(tmp_path) == []
+
+
+def test_where_no_process_can_be_started_nothing_is_compiled_beforehand(tmp_path, monkeypatch):
+    monkeypatch.setattr(kept, "list_folders", lambda sources: (tmp_path,))
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "nowhere"))
+    warm.make_ready()
+    assert files_in(tmp_path) == []
 
 
 LONG = """
@@ -500,20 +515,21 @@ def test_constants_in_a_call_compile_nothing_apart(town):
     assert len(sys.modules["town.inner"].number.signatures) == 1
 
 
-def test_the_pieces_compiled_beforehand_are_all_that_runs_call(tmp_path):
-    """A piece that lacks a function would leave it to be compiled by every worker."""
+def test_the_halves_compiled_beforehand_are_all_that_runs_call(tmp_path):
+    """A function that they lack would be left to be compiled by every worker."""
     script = f"""
 import sys
 from pathlib import Path
-from hiproof.city.run import Request, list_compiled_pieces, reconstruct_area
-from hiproof.city.work.warm_pieces import PIECES
+from hiproof.city.run import Request, reconstruct_area
+from hiproof.city.work.warm import HALVES, compile_half
 from hiproof.settings import Settings
 from hiproof.compiled import kept
 from hiproof.simulate import demo_files
 
 asked, read = set(), kept.Kept.read
 def noted(self, part, key):
-    asked.add((self.name, str(key[0])))
+    if key:
+        asked.add((self.start, str(key[0])))
     return read(self, part, key)
 kept.Kept.read = noted
 files = {{name: str(path) for name, path in demo_files().items()}}
@@ -521,10 +537,10 @@ with_footprints = dict(footprints=files["footprints"], terrain=files["terrain"])
 few = dict(bbox=(91990, 451000, 92034, 451040))
 settings = Settings().replace({{"fit": {{"parts": "one"}}}})
 one = dict(footprints=files["footprints"], settings=settings, **few)
+for half in HALVES:
+    compile_half(half)
 for given in (with_footprints, few, one):
     request = Request((files["cloud"],), Path({str(tmp_path)!r}), restart=True, **given)
-    for piece in list_compiled_pieces(request):
-        PIECES[piece]()
     beforehand = set(asked)
     assert reconstruct_area(request).buildings > 3
     print(sorted(asked - beforehand))

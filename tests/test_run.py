@@ -20,7 +20,6 @@ import planted
 from hiproof import read_parameters
 from hiproof.city import run as city_run
 from hiproof.city.run import Request, reconstruct_area
-from hiproof.city.work.tasks import WITHOUT_FOOTPRINTS
 from hiproof.city.work.warm import make_ready
 from hiproof.cli.app import app
 from hiproof.compose import check_solid
@@ -198,7 +197,7 @@ def test_progress_is_by_building(town_files, tmp_path, quick_tiles, processes):
 
 def test_two_workers_change_no_byte_and_compile_nothing(finished_run, files, tmp_path, monkeypatch):
     monkeypatch.setattr("hiproof.city.plan.prepare.MOST_BUILDINGS_A_TILE", 1)
-    make_ready(WITHOUT_FOOTPRINTS)
+    make_ready()
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_without_compiling)
     reconstruct_area(Request((str(files[0]),), tmp_path, str(files[1]), processes=2))
     assert records(tmp_path) == records(finished_run[0])

@@ -46,7 +46,6 @@ from .work.queue import Queue
 from .work.seams import warn_of_steps
 from .work.solve import solve_tile
 from .work.sort import sort_cloud
-from .work.tasks import MAIN_JOB, WITHOUT_FOOTPRINTS
 
 INPUTS = (
     *("clouds", "footprints", "layer", "id_attribute", "where"),
@@ -149,7 +148,7 @@ def reconstruct_in_folder(
             )
         clock.lap("plan")
         if ledger.open_tasks("sort") or ledger.open_tasks("solve"):
-            executor.prepare(list_compiled_pieces(request))
+            executor.prepare()
         clock.lap("prepare")
         queue = Queue(plan, state, ledger, executor, request.clouds, request.terrain, progress)
         queue.work_off("sort", steps.sort_cloud)
@@ -182,11 +181,6 @@ def reconstruct_in_folder(
         with suppress(sqlite3.Error):
             ledger.interrupt()
         ledger.close()
-
-
-def list_compiled_pieces(request: Request) -> tuple[str, ...]:
-    """Return the pieces of compiled code that the run needs."""
-    return WITHOUT_FOOTPRINTS if request.footprints is None else MAIN_JOB
 
 
 class Clock:

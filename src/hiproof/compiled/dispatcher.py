@@ -95,7 +95,8 @@ class Dispatcher(CPUDispatcher):
 
     def __init__(self, function: Callable):
         super().__init__(function, targetoptions=OPTIONS, pipeline_class=Compiler)
-        self.kept = Kept(function)
+        file = Path(function.__code__.co_filename)
+        self.kept = Kept(file, function.__qualname__, compute_stamp(file))
         self.entries: dict[tuple, Any] = {}
         self.callees: dict[tuple, tuple[Callee, ...]] = {}
 
@@ -104,7 +105,7 @@ class Dispatcher(CPUDispatcher):
         with global_compiler_lock:
             if args not in self.overloads and not self.read(args):
                 self.compile_code(args)
-            news.ready.add(self.kept.name)
+            news.ready.add(f"{self.py_func.__module__}.{self.py_func.__qualname__}")
 
     def read(self, args: tuple) -> bool:
         """Load the code from disk; return whether it was there."""

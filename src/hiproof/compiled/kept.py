@@ -15,7 +15,7 @@ import pickle
 import tempfile
 import uuid
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -23,17 +23,15 @@ from typing import Any
 import numba
 
 from ..errors import NotKeptWarning
-from .stamp import PYTHON, compute_stamp
+from .stamp import PYTHON
 
 
 class Kept:
     """One function's code, a file for each key of argument types and processor."""
 
-    def __init__(self, function: Callable):
-        file = Path(function.__code__.co_filename)
-        self.name = f"{function.__module__}.{function.__qualname__}"
-        self.module, self.stamp = file.stem, compute_stamp(file)
-        self.start = f"{file.stem}.{function.__qualname__}-{self.stamp}"
+    def __init__(self, file: Path, name: str, stamp: str):
+        self.module, self.stamp = file.stem, stamp
+        self.start = f"{file.stem}.{name}-{stamp}"
         self.folders = list_folders(file.parent)
 
     def read(self, part: str, key: tuple) -> Iterator[Any]:

@@ -12,8 +12,6 @@ from collections.abc import Callable
 
 from .stamp import count_compiled
 
-# what a process that compiles answers where a piece did not come to its end; else the piece's name
-FAILED = "failed"
 # of one core, with everything that it stands on: 82 to 127 s for 315 of them
 SECONDS_A_FUNCTION = 0.35
 

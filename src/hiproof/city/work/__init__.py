@@ -18,5 +18,4 @@ executors     where tasks run: this process, processes, a Dask cluster
 processes     the second of these, and how its workers begin and end
 cores         how many processes pay on this machine
 warm          what tasks call, compiled before they start
-warm_pieces   that, in pieces which processes compile side by side
 """

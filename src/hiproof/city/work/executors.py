@@ -4,7 +4,7 @@ It is this process, processes of this machine (processes.py), or a Dask cluster.
 
 One verb: `run`.
 
-`prepare(pieces)` comes first: compiled code is made before the work starts, so that no two workers
+`prepare()` comes first: compiled code is made before the work starts, so that no two workers
 make the same. `run(function, tasks)` yields (task, result, error) as tasks finish, in any order. A
 worker that dies does not end the run: its tasks come back with a `WorkerLost`, and the caller
 decides whether to try them again. `isolated()` is an executor whose worker's death harms nobody
@@ -14,7 +14,7 @@ else. Tasks are taken from their iterable only when a worker is near.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError
 from contextlib import suppress
 from queue import Empty, SimpleQueue
@@ -37,8 +37,8 @@ WORKERLESS_S, POLL_S = 300, 5
 class InProcess:
     """One task after the other in this process."""
 
-    def prepare(self, pieces: Sequence[str]) -> None:
-        make_ready(pieces)
+    def prepare(self) -> None:
+        make_ready()
 
     def run(self, function: Callable, tasks: Iterable[tuple]) -> Iterator[TaskOutcome]:
         for task in tasks:
@@ -71,7 +71,7 @@ class Dask:
                 f"expected a Dask scheduler at {address}, got: {error}; check the address"
             ) from error
 
-    def prepare(self, pieces: Sequence[str]) -> None:
+    def prepare(self) -> None:
         """Compile in one worker of each host, then load in the others.
 
         A host that joins later has to compile while it works.
@@ -79,9 +79,7 @@ class Dask:
         one_of_each = {urlsplit(address).hostname: address for address in self.client.nthreads()}
         ends: SimpleQueue = SimpleQueue()
         tasks = [
-            self.submit(
-                ends, make_ready, (tuple(pieces),), workers=[address], allow_other_workers=True
-            )
+            self.submit(ends, make_ready, (), workers=[address], allow_other_workers=True)
             for address in one_of_each.values()
         ]
         patience = threading.Timer(POLL_S, news.listener, (0, count_compiled()))

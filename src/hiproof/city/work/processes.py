@@ -8,7 +8,7 @@ import signal
 import sys
 import threading
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
@@ -43,9 +43,9 @@ class Processes:
         self.count_solved = RawValue("q", 0)  # by all workers, shared with them
         self.told = 0
 
-    def prepare(self, pieces: Sequence[str]) -> None:
+    def prepare(self) -> None:
         """Compile what no run compiled before."""
-        make_ready(pieces)
+        make_ready()
 
     def run(self, function: Callable, tasks: Iterable[tuple]) -> Iterator[TaskOutcome]:
         try:

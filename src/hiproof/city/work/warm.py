@@ -1,140 +1,128 @@
-"""Compiling before any work starts, in as many processes as cores.
+"""Compile what runs call before they start, in two processes, so that no two workers do.
 
-Later runs only look at a mark.
+    python -m hiproof.city.work.warm fit  # prints the names of functions as they become ready
 
-The processes are fresh ones that run `warm_pieces`, one piece of the code after the other, so that
-what pieces share of numba's own is compiled once a process: where they cannot be started, or one
-fails, the functions are compiled when they are called. A mark a piece lies beside the compiled
-code, and names the functions that were ready by then.
+One process fits a house and a hall, and the other calls what else runs call. They share next to
+nothing. Where they cannot be started, or one fails, functions are compiled when they are called.
 """
 
 from __future__ import annotations
 
+import gc
 import os
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 import numba
+import numpy as np
+import shapely
 from llvmlite.binding import get_host_cpu_name
 
-from ...compiled import find_dispatcher, kept, news
-from ...compiled.stamp import PACKAGE, compute_common_stamp
+from ...compiled import find_dispatcher, news
+from ...compiled.kept import Kept, place_to_write
+from ...compiled.stamp import compute_common_stamp
+from ...garbage import RARELY
 from ...log import LOGGER
+from ...settings import Settings
 from .cores import cores
 
+HALVES = ("fit", "rest")  # the longer one first
+HALL = shapely.box(0.0, 0.0, 60.0, 6.0)
 
-def make_ready(pieces: Sequence[str]) -> None:
-    """Compile those of the `pieces` that no run compiled before.
 
-    It takes a minute or so, which `news` reports.
+def make_ready() -> None:
+    """Compile what runs call, which takes a minute or so, unless a run did so before.
+
+    A file beside the compiled code says so, for one state of the sources and one processor. It
+    names the functions, which count as ready.
     """
-    missing = list_missing(pieces)
-    stamp, places = compute_common_stamp(), list_places()
-    folder = kept.place_to_write(places) if missing and find_dispatcher() else None
-    # all is there, or nothing can be kept, so that every process has to compile anyway
-    if folder is None:
+    mark = Kept(
+        Path(__file__), numba.config.CPU_NAME or get_host_cpu_name(), compute_common_stamp()
+    )
+    for (names,) in mark.read("", ()):
+        news.ready.update(names)
         return
-    kept.remove_outdated(folder, "warm", stamp)
-    news.processes = min(cores(), len(missing))
+    # where nothing can be kept, every process has to compile anyway
+    if find_dispatcher() and place_to_write(mark.folders) and compile_halves():
+        mark.write("", (), sorted(news.ready))
+
+
+def compile_halves() -> bool:
+    """Return whether both processes came to their end; what they compiled counts as ready."""
+    news.processes = min(cores(), len(HALVES))
     news.tell()
-    remainder = iter(missing)
-
-    def work_off() -> None:
-        for piece in compiled_pieces(remainder):
-            keep_mark(folder / mark(piece, stamp, read_processor()))
-
-    with ThreadPoolExecutor(news.processes) as pool:
-        for finished in [pool.submit(work_off) for _ in range(news.processes)]:
-            finished.result()
-    news.processes = 1
-
-
-def list_missing(pieces: Sequence[str]) -> list[str]:
-    """Return those of the `pieces` that no run compiled before.
-
-    The functions of the others count as ready.
-    """
-    stamp = compute_common_stamp()
-    missing = []
-    for piece in pieces:
-        name = mark(piece, stamp, read_processor())
-        marks = [place / name for place in list_places()]
-        if created := next(filter(Path.exists, marks), None):
-            news.ready.update(created.read_text(encoding="utf-8", errors="replace").split())
-        else:
-            missing.append(piece)
-    return missing
-
-
-def list_places() -> tuple[Path, ...]:
-    """Return the folders in which marks may lie."""
-    return kept.list_folders(PACKAGE)
-
-
-def keep_mark(file: Path) -> None:
-    """Write the mark `file`: the functions that are ready.
-
-    Where it cannot be written, the next run compiles the piece again.
-    """
+    reader, writer = os.pipe()
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     try:
-        file.write_text("\n".join(sorted(news.ready.copy())), encoding="utf-8")
-    except OSError:  # a full disk, most of all
-        with suppress(OSError):
-            file.unlink()
-        kept.warn_not_kept()
-
-
-def compiled_pieces(remainder: Iterator[str]) -> Iterator[str]:
-    """Compile pieces in a process while any remain.
-
-    `remainder` is shared with other threads. Yields each that came to its end. The process'
-    functions count as ready here too.
-    """
-    command = [sys.executable, "-m", "hiproof.city.work.warm_pieces"]
-    pipes: dict[str, Any] = {
-        "stdin": subprocess.PIPE,
-        "stdout": subprocess.PIPE,
-        "stderr": subprocess.DEVNULL,
-    }
-    try:
-        with subprocess.Popen(command, text=True, bufsize=1, env=environment(), **pipes) as at_work:
-            assert at_work.stdin and at_work.stdout
-            for piece in remainder:
-                print(piece, file=at_work.stdin)
-                for line in map(str.strip, iter(at_work.stdout.readline, "")):
-                    if line == piece:
-                        yield piece
-                    if line in (piece, news.FAILED):
-                        break
-                    news.ready.add(line)
-                    news.tell()
-                else:
-                    raise OSError(f"the process ended while it compiled {piece}")
+        processes = [
+            subprocess.Popen(
+                [sys.executable, "-m", __name__, half],
+                stdout=writer,
+                stderr=subprocess.DEVNULL,
+                env=environment,
+            )
+            for half in HALVES
+        ]
     except OSError as error:
-        LOGGER.debug("not all could be compiled beforehand: %s", error)
+        LOGGER.debug("nothing could be compiled beforehand: %s", error)
+        return False
+    finally:
+        os.close(writer)
+    with open(reader, encoding="utf-8") as lines:
+        for line in lines:
+            news.ready.update(line.split())
+            news.tell()
+    news.processes = 1
+    return not any([process.wait() for process in processes])
 
 
-def environment() -> dict[str, str]:
-    """Return the environment of a compiling process.
+def compile_half(half: str) -> None:
+    """Call what runs call, on houses so small that compiling is all that takes time."""
+    from ...fit.union.outline import draw_outline
+    from ...geometry.point_grid import PointGrid
+    from ...method import reconstruct
+    from ...simulate import random_compound, uniform_points
+    from ...write.head import FileHead
+    from ...write.run_files import fragments
 
-    It has this process's places to import from.
-    """
-    return {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    rng = np.random.default_rng(0)
+    house = random_compound(rng, "dormered")
+    outline, points = house.footprint, uniform_points(house, rng)
+    if half == "fit":
+        settings = Settings().replace({"reconstruct": {"align": "off"}})
+        reconstruct(points, outline, settings=settings)
+        reconstruct(make_hall(), HALL, settings=settings)
+        return
+    PointGrid(points).inside(outline)
+    settings = Settings().replace({"fit": {"parts": "one"}})
+    reconstruct(points, settings=settings)
+    building = reconstruct(
+        points, shapely.transform(outline, lambda xy: xy + 1.0), settings=settings
+    )
+    fragments(building, ("a", "a"), FileHead(offset=np.zeros(3)))
+    draw_outline(points)
 
 
-def read_processor() -> str:
-    """Return the name of this machine's processor, or of the one numba is given."""
-    return numba.config.CPU_NAME or get_host_cpu_name()
+def make_hall() -> np.ndarray:
+    """Return the points (n, 3) of a level roof with boxes in a row, which are copies."""
+    x, y = (axis.ravel() for axis in np.mgrid[0.3:60.0:0.6, 0.3:6.0:0.6])
+    return np.column_stack([x, y, np.where((x % 5 < 2) & (y % 5 < 2), 6.0, 5.0)])
 
 
-def mark(piece: str, stamp: str, processor: str) -> str:
-    """Return the name of a piece's mark.
+def main(half: str) -> None:
+    """Compile a half, and print the names of functions, a line each, as they become ready."""
+    printed: set[str] = set()
 
-    Another state of any compiled source, another processor or Python has another.
-    """
-    return f"warm.{piece}.{processor}-{stamp}-run.{kept.PYTHON}.nbc"
+    def tell(*_: int) -> None:
+        print(*sorted(news.ready - printed), sep="\n", flush=True)
+        printed.update(news.ready)
+
+    news.listener = tell
+    gc.set_threshold(RARELY)
+    compile_half(half)
+    tell()
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])
