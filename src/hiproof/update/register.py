@@ -77,6 +77,8 @@ CARRIED_BESIDE_GROUND, CARRIED_ALONE = 0.1, 2 / 3
 """Least share of the roofs' area that has to lie where a shift puts it: where the ground shows the
 same shift, and where there is no ground."""
 
+LEAST_SLOPE = 0.1  # mean gradient of a roof from which on it shows a shift aside
+
 FEWEST_ROOFS = 8
 """Roofs from which on their noise is estimated rather than assumed, and carry a shift alone."""
 
@@ -268,6 +270,7 @@ def register_surveys(samples: Iterable[SampledRoof], read: ReadSettings) -> Surv
         shift, sigma = np.array(fixed), np.zeros(3)
     else:
         shift, sigma = solve_shift(rows, ground, float(np.median(heights)))
+        shift[:2] *= any(shows_aside(row, shift) for row in rows)
     level, aside = measure_level(ground, shift), count_aside(rows, ground, shift)
     ground[:, 2] += ground[:, 3:] @ shift[:2]
     offsets = np.array([np.median(residuals - design @ shift) for design, residuals in rows])
@@ -316,6 +319,17 @@ def count_aside(
     count = sum(fits(row, other) for row in left)
     is_other = math.hypot(*(other - shift)[:2]) > USUAL_ASIDE_M
     return count if is_other and count >= FEWEST_ASIDE else 0
+
+
+def shows_aside(row: tuple[np.ndarray, np.ndarray], shift: np.ndarray) -> bool:
+    """Return whether a roof has slopes, and most of its points lie where a `shift` (3,) puts them.
+
+    One slope that became steeper lies where a shift aside puts it, but not those that face others.
+    """
+    design, residuals = row
+    off = np.abs(residuals - design @ shift)
+    is_steep = np.hypot(*design[:, :2].T).mean() > LEAST_SLOPE
+    return bool(is_steep and np.quantile(off, CARRIED_ALONE) < 2 * SAME_HEIGHT_M)
 
 
 def fits(row: tuple[np.ndarray, np.ndarray], shift: np.ndarray) -> bool:
