@@ -155,3 +155,17 @@ def test_a_hidden_end_of_a_roof_is_measured(density, has_old):
             ratios.append(area / hidden.area)
     assert sum(ratio > 0.5 for ratio in ratios) >= 57, sorted(ratios)[:6]
     assert max(ratios) < 1.4
+
+
+@pytest.mark.parametrize("density", [3.0, 8.0, 16.0])
+def test_water_on_a_flat_roof_is_a_hole(density):
+    """Points are left along its edges alone, so hardly any cell is full."""
+    rng, ratios = np.random.default_rng([int(density), 4]), []
+    while len(ratios) < 20:
+        roof = random_building(rng, "flat").roof
+        pond = shapely.buffer(roof.outline, -rng.uniform(1.2, 2.2))
+        old, new = scan(rng, roof, density), scan(rng, roof, density)
+        area = find(roof, old, new[~shapely.intersects_xy(pond, *new[:, :2].T)])
+        if area is not None and pond.buffer(-2.0).area > 4.0:
+            ratios.append(area / pond.area)
+    assert sum(0.6 < ratio < 1.4 for ratio in ratios) >= 18, sorted(ratios)

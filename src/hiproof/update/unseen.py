@@ -12,15 +12,18 @@ import math
 import numpy as np
 import shapely
 
-from ..geometry.grid import number_cells
+from ..geometry.grid import KEY_OF_CELL
 from ..model import Roof
 from ..status import ChangeKind
-from .cells import CellComparison, predict_occupancy, shrink_outline
+from .cells import CellComparison, shrink_outline
 from .kinds import Difference, draw_cells
+from .lineage import PART_GRID_M
 
-REACH_M, POINTS_WITHIN = 1.0, 28.0
-"""Least distance (m) from all points at which a place is unseen, and points that a circle of this
-radius would hold otherwise: seven of them in the quarter at a corner."""
+REACH_M, NEIGHBOURS, OVER_NEIGHBOURS = 1.0, 7, 2.0
+"""Least distance (m) from all points at which a place is unseen. It is at least so many times that
+of a point from its seventh neighbour: a circle of this radius would hold 28 points otherwise, and
+its quarter at a corner seven. Lines of points that lie far apart make larger cells, of which the
+side counts."""
 
 LEAST_UNSEEN_M2 = 8.0
 """Area (m2) without points from which on a part is reported, as of bare ground in a first survey.
@@ -32,33 +35,37 @@ def find_unseen(roof: Roof, comparison: CellComparison) -> list[Difference]:
 
     Small places do not count. Without old points all of the earlier roof could be seen.
     """
-    c = comparison
-    is_seen, side = c.n_new > 0, c.cell_m
-    empty = c.cells[~is_seen] if len(c.number_old) else list_empty(roof, c)
-    density = float(c.n_new[is_seen].mean()) * predict_occupancy(c.n_new) / side**2
-    circle_m2 = POINTS_WITHIN / density
-    least_m2 = max(LEAST_UNSEEN_M2, circle_m2 / 2)
-    if len(empty) * side**2 < least_m2:
+    c, xy = comparison, comparison.points[:, :2]
+    cells, is_known = list_cells(roof, c)
+    if not len(xy) or is_known.sum() * PART_GRID_M**2 < LEAST_UNSEEN_M2:
         return []
-    from scipy.spatial import KDTree  # only where much has no points
+    from scipy.spatial import KDTree
 
-    reach = max(REACH_M, math.sqrt(circle_m2 / math.pi), side) / side
-    core = empty[KDTree(c.cells[is_seen]).query(empty)[0] > reach]
+    tree, places = KDTree(xy), (cells + 0.5) * PART_GRID_M
+    spacing = float(np.median(tree.query(xy, [min(NEIGHBOURS, len(xy))])[0]))
+    reach = max(REACH_M, OVER_NEIGHBOURS * spacing, c.cell_m)
+    core = places[is_known & (tree.query(places)[0] > reach)]
     if not len(core):
         return []
-    members = empty[KDTree(core).query(empty)[0] <= reach]
-    place = shapely.intersection(draw_cells(members, side), roof.outline)
-    if place.area < least_m2:
+    members = cells[KDTree(core).query(places)[0] <= reach]
+    place = shapely.intersection(draw_cells(members, PART_GRID_M), roof.outline)
+    if place.area < max(LEAST_UNSEEN_M2, math.pi * reach**2 / 2):
         return []
     return [Difference(ChangeKind.UNSEEN, math.nan, math.nan, place.area, place)]
 
 
-def list_empty(roof: Roof, comparison: CellComparison) -> np.ndarray:
-    """Return the cells (k, 2) of a roof without new points."""
-    inner, side = shrink_outline(roof.outline), comparison.cell_m
-    x0, y0, x1, y1 = np.floor(np.array(inner.bounds) / side).astype(np.int64).tolist()
+def list_cells(roof: Roof, comparison: CellComparison) -> tuple[np.ndarray, np.ndarray]:
+    """Return the cells (k, 2) of PART_GRID_M of a roof, and whether (k,) both surveys count there.
+
+    They do inside its walls, where the earlier survey shows it.
+    """
+    c, side = comparison, PART_GRID_M
+    x0, y0, x1, y1 = np.floor(np.array(roof.outline.bounds) / side).astype(np.int64).tolist()
     cells = np.mgrid[x0 : x1 + 1, y0 : y1 + 1].reshape(2, -1).T
-    cells = cells[shapely.intersects_xy(inner, *((cells + 0.5) * side).T)]
-    _, number = number_cells(np.concatenate([comparison.cells, cells]))
-    n_known = len(comparison.cells)
-    return cells[~np.isin(number[n_known:], number[:n_known])]
+    cells = cells[shapely.intersects_xy(roof.outline, *((cells + 0.5) * side).T)]
+    middles = (cells + 0.5) * side
+    is_known = shapely.intersects_xy(shrink_outline(roof.outline), *middles.T)
+    if len(c.number_old):
+        keys = np.floor(middles / c.cell_m).astype(np.int64) @ KEY_OF_CELL
+        is_known &= np.isin(keys, c.cells[c.n_old > 0].astype(np.int64) @ KEY_OF_CELL)
+    return cells, is_known
