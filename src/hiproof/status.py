@@ -103,6 +103,7 @@ class ChangeKind(Enum):
     SLOPE_CHANGED = "the roof has another slope"
     SMALL_OBJECT = "a small object, such as a dormer or solar panels, was added or removed"
     OUTLINE_CHANGED = "the building has another outline"
+    REBUILT = "another building stands there, partly elsewhere"
     MOVED = "the building stands beside its earlier place"
     SPLIT = "its footprint is part of an earlier one"
     MERGED = "its footprint joins earlier ones"

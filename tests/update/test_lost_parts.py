@@ -9,47 +9,16 @@ import shapely
 from hiproof.city.request import Request
 from hiproof.city.run import reconstruct_area
 from hiproof.errors import InputError
-from hiproof.update.request import UpdateRequest
-from hiproof.update.run import update_area
 from run_records import by_id
 from tiny_town import ORIGIN, make_town, write_cloud, write_footprints
+from tiny_updates import lay_bare, make_run, take_kind, update
 
 KEPT = {"house-0": 0.55, "house-2": 0.75, "house-3": 0.45}  # share of the length that stays
 
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
-    """The folder of a run over the tiny town."""
-    folder, town = tmp_path_factory.mktemp("run"), make_town(density=8.0)
-    cloud = write_cloud(folder / "first.laz", town.xyz, town.classification)
-    outlines = write_footprints(folder / "outlines.geojson", town.footprints)
-    reconstruct_area(Request((str(cloud),), folder / "models", str(outlines), id_attribute="id"))
-    return folder / "models"
-
-
-def update(run, out, town, changes=None, **options):
-    cloud = str(write_cloud(out.with_suffix(".laz"), town.xyz, town.classification))
-    parameters = str(run / "parameters.jsonl")
-    request = UpdateRequest((cloud,), out, run=run, run_parameters=parameters, date="2024-05-01")
-    update_area(dataclasses.replace(request, **options), changes)
-    return by_id(out)
-
-
-def lay_bare(town, id, kept, code=2):
-    """Pull down the eastern end of a house, now ground of a class; return its area."""
-    x0, y0, x1, y1 = town.footprints[id].bounds
-    end = shapely.box(x0 + kept * (x1 - x0), y0, x1, y1)
-    gone = shapely.intersects_xy(end, *town.xyz[:, :2].T)
-    rng = np.random.default_rng(3)
-    town.xyz[gone, 2] = ORIGIN[2] + 0.01 * (town.xyz[gone, 0] - ORIGIN[0])
-    town.xyz[gone, 2] += rng.normal(0, 0.03, gone.sum())
-    town.classification[gone] = code
-    return end.area
-
-
-def take_kind(row):
-    change = row.get("change")
-    return "unchanged" if change is None else (change["places"] or [{"kind": None}])[0]["kind"]
+    return make_run(tmp_path_factory.mktemp("run"))
 
 
 @pytest.mark.parametrize("code", [2, 1], ids=["ground", "unclassified"])
@@ -84,9 +53,9 @@ def test_a_small_rest_that_stands_is_not_demolished(run, density, tmp_path):
     town.classification[is_tower] = 6
     lay_bare(town, "house-3", 0.0)
     before, after = by_id(run), update(run, tmp_path / "out", town)
-    for id in ("house-0", "house-2"):
+    for id, kind in (("house-0", "part_removed"), ("house-2", "rebuilt")):
         assert after[id]["change"]["class"] == "changed", id
-        assert take_kind(after[id]) == "part_removed", id
+        assert take_kind(after[id]) == kind, id
     outlines = [
         shapely.Polygon(row["parts"][0]["outlines"][0][0])
         for row in (before["house-0"], after["house-0"])

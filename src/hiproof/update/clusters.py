@@ -158,7 +158,7 @@ def link_neighbours(keys: np.ndarray) -> np.ndarray:
 
 
 def describe_cluster(
-    comparison: CellComparison, members: np.ndarray, cells: int, stray: float
+    comparison: CellComparison, members: np.ndarray, cells: int, stray: float = CELL_CHANCE
 ) -> ChangedCells:
     """Return the cluster of cells `members` (m,) among so many `cells` of a building."""
     d, s = comparison.difference[members], comparison.sigma[members]

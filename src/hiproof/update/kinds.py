@@ -15,8 +15,15 @@ import shapely
 from ..model import Roof
 from ..status import ChangeKind
 from .cells import MEDIAN_VARIANCE, CellComparison, find_slopes
-from .clusters import ChangedCells
-from .judge import OVER_GROUND_M, SMALL_M2, ChangeVerdict, find_heights
+from .clusters import describe_cluster
+from .judge import (
+    FEWEST_COMPARED,
+    OVER_GROUND_M,
+    SMALL_M2,
+    SMALLEST_M2,
+    ChangeVerdict,
+    find_heights,
+)
 from .lineage import show_parts
 
 ALIKE_SHARE, ALIKE_M = 0.2, (0.1, 0.25)
@@ -39,6 +46,9 @@ LARGER = 0.1
 
 AS_ONE_SHARE = 0.65
 """Share of a part's cells, or of a building's, from which on it changed as one."""
+
+LEAST_ASIDE_M2 = 1.0
+"""Area (m2) that lies bare where a roof stands elsewhere: of one that is turned, its corners."""
 
 SAME_PART = 0.6
 """Intersection over union from which on two parts take the same place."""
@@ -118,13 +128,26 @@ def name_differences(
     whole = name_whole(np.logical_or.reduce([np.zeros(len(members), bool), *places]), sides)
     if whole is not None:
         return [whole]
-    named = [name_cluster(*item, sides) for item in zip(verdict.clusters, places, strict=True)]
+    named = [
+        name_place(cluster.area_m2 * piece.sum() / inside.sum(), piece, sides)
+        for cluster, inside in zip(verdict.clusters, places, strict=True)
+        for piece in split_bare(inside, sides)
+    ]
     return sorted(named, key=lambda item: -item.area_m2)
 
 
+def split_bare(inside: np.ndarray, sides: BeforeAfter) -> list[np.ndarray]:
+    """Split the cells `inside` (k,) a cluster that is partly bare ground and partly roof."""
+    pieces = [inside & sides.on_ground, inside & ~sides.on_ground]
+    fewest = max(FEWEST_COMPARED, SMALLEST_M2 / sides.comparison.cell_m2)
+    return pieces if min(piece.sum() for piece in pieces) >= fewest else [inside]
+
+
 def name_doubts(verdict: ChangeVerdict) -> list[Difference]:
-    """Return the places that make a building uncertain."""
+    """Return the places that make a building uncertain, all of it where none stands out."""
     c = verdict.comparison
+    everywhere = np.flatnonzero(c.is_compared)
+    clusters = verdict.clusters or (describe_cluster(c, everywhere, len(everywhere)),)
     return [
         Difference(
             ChangeKind.UNCLEAR,
@@ -133,7 +156,7 @@ def name_doubts(verdict: ChangeVerdict) -> list[Difference]:
             cluster.area_m2,
             draw_cells(c.cells[cluster.members], c.cell_m),
         )
-        for cluster in verdict.clusters
+        for cluster in clusters
     ]
 
 
@@ -141,37 +164,51 @@ def name_whole(inside: np.ndarray, sides: BeforeAfter) -> Difference | None:
     """Name the change of a roof as a whole, None where only places of it changed.
 
     `inside` (k,) are the cells of all clusters. A roof of another type or slope crosses the earlier
-    one, so fewer cells contradict it.
+    one, so fewer cells contradict it. One that stands partly elsewhere was built anew.
     """
     d, everywhere = sides.difference, np.ones(len(inside), bool)
     moved, pair = find_moved(inside, d), sides.find_pair(everywhere)
-    kind = None
+    bare, kind = inside & sides.on_ground, None
     if not inside.any() or (
         moved.mean() >= AS_ONE_SHARE and moves_together(d) and has_all(moved, sides.parts[0])
     ):
         kind = ChangeKind.ROOF_RAISED if np.median(d) > 0 else ChangeKind.ROOF_LOWERED
-    elif (
-        is_same_place(pair, sides)
-        and not sides.on_ground[inside].any()
-        and not moves_together(d[inside])
-    ):
+    elif bare.sum() * sides.comparison.cell_m2 >= LEAST_ASIDE_M2:
+        is_other = share_of_part(~bare, inside) >= HALF and not moves_together(d[~bare])
+        kind = ChangeKind.REBUILT if is_other else None
+    elif is_same_place(pair, sides) and not bare.any() and not moves_together(d[inside]):
         is_other = is_other_type(pair, sides)
         if not is_other and keeps_slope(inside, sides):
             return name_raised_aside(inside, pair, sides)
-        if inside.mean() >= (CROSSING if is_other else HALF):
+        if inside.mean() >= (CROSSING if is_other or turns(inside, pair, sides) else HALF):
             kind = ChangeKind.TYPE_CHANGED if is_other else ChangeKind.SLOPE_CHANGED
     return kind and describe_place(kind, everywhere, pair, sides)
 
 
 def keeps_slope(inside: np.ndarray, sides: BeforeAfter) -> bool:
     """Return whether cells `inside` (k,) all went up, or all down, and slope as before."""
-    d, xy = sides.difference[inside], sides.comparison.centres[sides.members[inside]]
-    if sides.after is None or d.min() * d.max() < 0:
-        return False
+    d = sides.difference[inside]
+    return d.min() * d.max() >= 0 and measure_turn(inside, sides) < SAME_SLOPE
+
+
+def turns(inside: np.ndarray, pair: tuple[int, int], sides: BeforeAfter) -> bool:
+    """Return whether the new part of a `pair` shows in cells `inside` (k,), and slopes otherwise.
+
+    What was added to a roof is another part.
+    """
+    is_main = np.mean(sides.parts[1][inside] == pair[1]) >= AS_ONE_SHARE
+    return bool(is_main and SAME_SLOPE < measure_turn(inside, sides) < math.inf)
+
+
+def measure_turn(inside: np.ndarray, sides: BeforeAfter) -> float:
+    """Return by how much (gradient) the slopes of both roofs differ in cells `inside` (k,)."""
+    if sides.after is None:
+        return math.inf
+    xy = sides.comparison.centres[sides.members[inside]]
     before, after = (find_slopes(roof, xy) for roof in (sides.before, sides.after))
-    known = np.isfinite(before + after).all(axis=1)
-    off = np.hypot(*(after - before)[known].T)
-    return bool(known.any() and np.median(off) < SAME_SLOPE)
+    off = np.hypot(*(after - before).T)
+    known = off[np.isfinite(off)]
+    return float(np.median(known)) if len(known) else math.inf
 
 
 def name_raised_aside(
@@ -204,28 +241,29 @@ def has_all(inside: np.ndarray, shown: np.ndarray) -> bool:
     return min((share_of_part(shown == part, inside) for part in larger), default=1.0) >= HALF
 
 
-def name_cluster(cluster: ChangedCells, inside: np.ndarray, sides: BeforeAfter) -> Difference:
+def name_place(area_m2: float, inside: np.ndarray, sides: BeforeAfter) -> Difference:
     """Name the change of a place of a roof, whose cells are `inside` (k,)."""
-    pair = sides.find_pair(inside)
+    pair, stands = sides.find_pair(inside), ~sides.on_ground
     share_before, share_after = (
-        share_of_part(shown == part, inside) for shown, part in zip(sides.parts, pair, strict=True)
+        share_of_part((shown == part) & stands, inside)
+        for shown, part in zip(sides.parts, pair, strict=True)
     )
-    is_part = share_before >= AS_ONE_SHARE and len(sides.before.parts) > 1
+    is_part = share_before >= AS_ONE_SHARE and (len(sides.before.parts) > 1 or not stands.all())
+    difference_m = float(np.median(sides.difference[inside]))
     together = moves_together(sides.difference[inside])
     if sides.on_ground[inside].mean() > HALF:
         kind = ChangeKind.PART_REMOVED
     elif is_part and is_same_place(pair, sides) and not (together or keeps_slope(inside, sides)):
         other = is_other_type(pair, sides)
         kind = ChangeKind.TYPE_CHANGED if other else ChangeKind.SLOPE_CHANGED
-    elif cluster.area_m2 < SMALL_M2 or abs(cluster.difference_m) < THIN_LAYER_M:
+    elif area_m2 < SMALL_M2 or abs(difference_m) < THIN_LAYER_M:
         kind = ChangeKind.SMALL_OBJECT
-    elif cluster.difference_m > 0:
+    elif difference_m > 0:
         kind = ChangeKind.PART_RAISED if is_part else ChangeKind.PART_ADDED
     else:
-        is_own = share_after >= AS_ONE_SHARE
+        is_own = is_part or share_after >= AS_ONE_SHARE
         kind = ChangeKind.PART_LOWERED if is_own else ChangeKind.PART_REMOVED
-    place = describe_place(kind, inside, pair, sides)
-    return dataclasses.replace(place, area_m2=cluster.area_m2)
+    return dataclasses.replace(describe_place(kind, inside, pair, sides), area_m2=area_m2)
 
 
 def describe_place(

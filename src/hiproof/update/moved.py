@@ -25,7 +25,15 @@ from ..stages.remarks import add_finding
 from ..status import Change, Doubt, Status
 from .cells import MEDIAN_VARIANCE, CellComparison
 from .epochs import Surveys
-from .judge import FEWEST_COMPARED, OVER_GROUND_M, ChangeVerdict, judge_building, lies_bare
+from .judge import (
+    FEWEST_COMPARED,
+    OVER_GROUND_M,
+    SMALLEST_M2,
+    ChangeVerdict,
+    find_bare,
+    judge_building,
+)
+from .kinds import moves_together
 from .lineage import lift_part, measure_lift, show_parts, unite_lifts
 from .places import move_to_frame
 
@@ -77,13 +85,16 @@ def move_building(
 def measure_lifts(roof: Roof, comparison: CellComparison, near_m: float) -> list[float] | None:
     """Return how much higher (m) each part lies, 0 for one that did not move.
 
-    None where a part has too few cells. Parts that moved together move by the same height.
+    None where a part has too few cells, or these did not move alike. Parts that moved together move
+    by the same height.
     """
     result = {}
     for number, d in enumerate(split_by_part(roof, comparison, comparison.difference)):
         if len(d) < FEWEST_COMPARED:
             return None
         result[number] = measure_lift(d, near_m)
+        if result[number] and not moves_together(d):
+            return None
     return list(unite_lifts(result, near_m).values())
 
 
@@ -140,17 +151,19 @@ class LostParts:
     def find(cls, verdict: ChangeVerdict, earlier: Roof) -> LostParts | None:
         """Find the places that a verdict calls changed and where the ground lies bare.
 
-        None where there are none.
+        None where they are too small.
         """
-        c, ground = verdict.comparison, verdict.ground
-        bare = [cluster for cluster in verdict.clusters if lies_bare(cluster, c, ground)]
-        if not bare or verdict.change is Change.UNCERTAIN:
+        c, changed = verdict.comparison, [cluster.members for cluster in verdict.clusters]
+        if not changed or verdict.change is Change.UNCERTAIN:
             return None
-        places = c.centres[np.concatenate([cluster.members for cluster in bare])]
-        is_low = c.points[:, 2] - ground.height_at(c.points) < OVER_GROUND_M
+        is_bare = np.logical_and(*find_bare(c, earlier, verdict.ground))
+        bare = np.intersect1d(np.concatenate(changed), np.flatnonzero(is_bare))
+        area_m2 = len(bare) * c.cell_m2
+        if area_m2 < SMALLEST_M2:
+            return None
+        is_low = c.points[:, 2] - verdict.ground.height_at(c.points) < OVER_GROUND_M
         xy = c.points[:, :2]
-        area_m2 = sum(cluster.area_m2 for cluster in bare)
-        return cls(places, area_m2, xy[~is_low], xy[is_low], earlier)
+        return cls(c.centres[bare], area_m2, xy[~is_low], xy[is_low], earlier)
 
     def measure_under(self, building: Building) -> float:
         """Return the lost area (m2) that a model covers, 0 where it covers little of it."""

@@ -353,8 +353,9 @@ class Updater:
         """Return the `new` building in place of the earlier one, perhaps over another outline."""
         points = select_roof(self.epochs.new, job).points
         result, lineage = continue_parts(earlier, new, self.near_m, points)
-        is_changed = verdict.change is Change.CHANGED
-        places = self.name_places(earlier, result, verdict) if is_changed else []
+        is_moved = outline is not None and outline.kind is ChangeKind.MOVED
+        is_named = verdict.change is Change.CHANGED and not is_moved
+        places = self.name_places(earlier, result, verdict) if is_named else []
         if outline is not None:
             is_first = outline.place.area > max((place["area"] for place in places), default=0.0)
             places.insert(0 if is_first else len(places), *record_places([outline]))
