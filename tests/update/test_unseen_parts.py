@@ -100,6 +100,19 @@ def test_without_the_earlier_clouds_the_model_says_what_could_be_seen(run, tmp_p
     assert classes == dict.fromkeys(classes, "unchanged") | {"house-2": "not_covered"}
 
 
+@pytest.mark.parametrize("kept", [0.0, 0.2])
+def test_a_house_that_the_survey_hardly_covers_has_a_place(run, kept, tmp_path):
+    town, _ = make_winged(6.0, 6)
+    x0, _, x1, _ = town.footprints["house-2"].bounds
+    town = hide(town, town.xyz[:, 0] > x0 + kept * (x1 - x0))
+    change = update(run, tmp_path / "out", town)["house-2"]["change"]
+    assert change["class"] == "not_covered"
+    (place,) = change["places"]
+    assert place["kind"] == "unseen"
+    area_m2 = (1 - kept) * town.footprints["house-2"].area
+    assert place["area"] == pytest.approx(area_m2, rel=0.25)
+
+
 @pytest.mark.parametrize("seed", [7, 8])
 def test_a_changed_house_also_names_its_unseen_wing(run, seed, tmp_path):
     town, wings = make_winged(6.0, seed)

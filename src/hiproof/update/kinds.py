@@ -180,7 +180,7 @@ def name_whole(inside: np.ndarray, sides: BeforeAfter) -> Difference | None:
         is_other = is_other_type(pair, sides)
         if not is_other and keeps_slope(inside, sides):
             return name_raised_aside(inside, pair, sides)
-        if inside.mean() >= (CROSSING if is_other or turns(inside, pair, sides) else HALF):
+        if inside.mean() >= CROSSING and (is_other or turns(inside, pair, sides)):
             kind = ChangeKind.TYPE_CHANGED if is_other else ChangeKind.SLOPE_CHANGED
     return kind and describe_place(kind, everywhere, pair, sides)
 

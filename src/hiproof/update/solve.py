@@ -61,8 +61,6 @@ BEGINNING = (Change.CHANGED, Change.NEW)  # the roof as it is begins with the su
 TESTED = (Change.CHANGED, Change.UNCHANGED, Change.UNCERTAIN, Change.GONE)
 """Classes of buildings that were tested; others have too few points."""
 
-UNDIVIDED = (Change.GONE, Change.NOT_COVERED)  # classes that hold for all parts of a building
-
 SHIFT_DIGITS = 3  # of footprints: millimetres
 
 GROUND_MOVED_M = 0.25
@@ -147,8 +145,8 @@ class Updater:
         verdict = self.judge(job, member.record, earlier, roof)
         if roof is None or verdict is None:
             return self.revisit_empty(job, member, earlier)
-        is_divided = verdict.change not in UNDIVIDED
-        unseen = find_unseen(roof, verdict.comparison) if is_divided else []
+        is_gone = verdict.change is Change.GONE
+        unseen = [] if is_gone else find_unseen(roof, verdict.comparison)
         if verdict.change is Change.UNCHANGED and member.is_same_outline and not unseen:
             kept = self.refine(job, member.record) if self.surveys.refine else None
             kept = kept or keep_texts(earlier, member.record, self.texts)

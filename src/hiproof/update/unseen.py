@@ -37,7 +37,9 @@ def find_unseen(roof: Roof, comparison: CellComparison) -> list[Difference]:
     """
     c, xy = comparison, comparison.points[:, :2]
     cells, is_known = list_cells(roof, c)
-    if not len(xy) or is_known.sum() * PART_GRID_M**2 < LEAST_UNSEEN_M2:
+    if not len(xy):
+        return [Difference(ChangeKind.UNSEEN, math.nan, math.nan, roof.outline.area, roof.outline)]
+    if is_known.sum() * PART_GRID_M**2 < LEAST_UNSEEN_M2:
         return []
     from scipy.spatial import KDTree
 
