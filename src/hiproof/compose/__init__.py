@@ -13,6 +13,7 @@ check             whether the result is valid by ISO 19107
 check_faces       its rules for each face by itself
 simpler           parts given up one by one, where a roof cannot become a valid solid
 blocks            LoD1: prisms over the outline; installations on roofs
+lids              walls that close a solid between its other faces
 underside         walls down to the terrain, and passages below a solid
 overhang          slabs of a roof beyond walls
 eaves             a model with overhangs, as many as make a valid solid

@@ -18,7 +18,7 @@ from ..model.overhang import ROOF_EDGE, WALLS
 from ..settings import ComposeSettings, Settings
 from .arrangement import GRID_M
 from .check import Finding, check_solid
-from .overhang import OverhangingShell, to_grid
+from .overhang import hang_over, to_grid
 from .settle import PLAN_DIGITS
 from .solid import compose
 from .underside import cap_by_place, cap_everywhere
@@ -160,8 +160,7 @@ def close_solid(
         caps.append(cap_everywhere(level, options.ground_clearance_m))
     for cap, share in itertools.product(caps, THICKNESS_SHARES):
         thickness = round(share * thickness_m / GRID_M)
-        shell = OverhangingShell(level, model.underside, cap, to_grid(walls), thickness)
-        solid = shell.close()
+        solid = hang_over(level, model.underside, cap, to_grid(walls), thickness)
         findings = check_solid(solid, planarity_m=options.planarity_m)
         if not findings:
             break

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -22,21 +22,28 @@ import shapely
 
 from ..errors import CompositionError
 from ..geometry.rings import intersect, list_between, subtract, unite, with_area
-from ..model import CEILING, GROUND, ROOF, WALL, Face, Model, Passage, Solid, Underside
+from ..model import CEILING, GROUND, ROOF, Face, Model, Passage, Solid, Underside
 from ..settings import ComposeSettings
 from .arrangement import GRID_M
-from .building_parts import list_edges
 from .check import check_solid
+from .lids import (
+    BESIDE_EDGE_UNITS,
+    ON_EDGE_UNITS,
+    Lid,
+    Place,
+    close_lids,
+    list_edges,
+    list_lids,
+    list_places,
+)
 from .settle import PLAN_DIGITS
 
 LEAST_ROOM_M = 0.5  # between the ground and a passage's ceiling; nobody goes through less
 SNAP_UNITS = 1000.0  # 0.1 m; corners of passages so near a wall lie on it
-ON_EDGE_UNITS = 2.0  # 0.2 mm; rounding moves a corner off its edge by less
+SAME_PLACE_UNITS = 15.0  # 1.5 mm; composing a roof moves a corner of its outline by less
+REACHES = (ON_EDGE_UNITS, BESIDE_EDGE_UNITS)  # of edges, in turn until the solid is valid
+OPEN = 302  # the code of a shell that is not closed
 ON_ROOF_UNITS = 10.0  # 1 mm; a corner lies under a roof face so near in plan
-
-Place = tuple[int, int]  # a place in plan, in units of the grid
-
-Corner = tuple[int, int, int]  # a corner of a solid, in units of the grid
 
 
 class GroundCell(NamedTuple):
@@ -54,14 +61,22 @@ def make_underside(solid: Solid, underside: Underside, options: ComposeSettings)
     comes out.
     """
     findings: tuple = ()
+    roofs = list_lids(solid, ROOF)
     clearance = options.ground_clearance_m
-    for cap in (cap_by_place(solid, clearance), cap_everywhere(solid, clearance)):
-        result = Shell(solid, underside, cap).close()
+    caps = [cap_by_place(solid, clearance)]
+    if underside.terrain:
+        caps.append(cap_everywhere(solid, clearance))
+    for cap, reach in itertools.product(caps, REACHES):
+        lids = list_undersides(solid, underside, cap, draw_ground(solid), list_places(roofs))
+        result = close_lids([*roofs, *lids], reach)
         findings = check_solid(result, planarity_m=options.planarity_m)
         if not findings:
             return result
-        if not underside.terrain:
-            break
+    if underside.passages and findings[0].code == OPEN:
+        raise CompositionError(
+            "expected passages whose corners lie on the walls they cross, got one beside a wall; "
+            "draw it across the outline"
+        )
     raise CompositionError(
         "expected a valid solid over its terrain and passages, got one that is none by ISO 19107 "
         f"(code {findings[0].code}); leave them out"
@@ -105,204 +120,116 @@ def fit_plane(solid: Solid, face: Face) -> np.ndarray:
     return np.linalg.lstsq(design, xyz[:, 2], rcond=None)[0]
 
 
-class Shell:
-    """A solid while its underside is made; places within `on_edge_units` lie on an edge."""
+def list_undersides(
+    solid: Solid, underside: Underside, cap: Cap, area: shapely.Geometry, corners: np.ndarray
+) -> list[Lid]:
+    """Return the lids below a solid on one level: its ground and ceilings, within an `area`.
 
-    on_edge_units = ON_EDGE_UNITS
+    Walls' feet bend at `corners` (n, 2) of other lids rather than beside them.
+    """
+    cells = cut_cells(area, underside.passages)
+    outer = [ring for part in shapely.get_parts(area) for ring in list_rings(part)]
+    others = {*place_knots(outer, underside), *itertools.chain(*outer)}
+    plans = node_rings(
+        [list_rings(cell.polygon) for cell in cells], others, corners, BESIDE_EDGE_UNITS
+    )
+    places = itertools.chain(*itertools.chain(*plans))
+    ground = measure_ground(places, solid, underside, cap)
+    lids: list[Lid] = []
+    for cell, rings in zip(cells, plans, strict=True):
+        if cell.ceiling is None:
+            lids += draw_lids(rings, ground)
+            continue
+        highest = max(ground[place] for ring in rings for place in ring)
+        refuse_unusable(solid, cell.polygon, cell.ceiling, highest)
+        lids.append(
+            Lid([[(*place, cell.ceiling) for place in ring[::-1]] for ring in rings], CEILING)
+        )
+    return lids
 
-    def __init__(self, solid: Solid, underside: Underside, cap: Cap) -> None:
-        self.solid = solid
-        self.grid: list[Corner] = [
-            (x, y, z) for x, y, z in np.rint(solid.vertices / GRID_M).astype(int).tolist()
-        ]
-        grounds = [ring for face in solid.select_faces(GROUND) for ring in face.rings]
-        self.ground_edges = {edge for ring in grounds for edge in list_edges(ring)}
-        self.on_ground = {vertex for edge in self.ground_edges for vertex in edge}
-        self.z_base = self.grid[grounds[0][0]][2]
-        rings = [[self.grid[vertex][:2] for vertex in reversed(ring)] for ring in grounds]
-        self.profile = Profile(underside.terrain) if underside.terrain else None
-        self.bends: set[Place] = set()
-        self.cells = self.cut_ground(rings, underside.passages)
-        self.rings = self.node_cells(rings)
-        self.ground = self.measure_ground(cap)
-        self.cell_at = {
-            edge: number
-            for number, cell_rings in enumerate(self.rings)
-            for ring in cell_rings
-            for edge in list_edges(ring)
-        }
-        self.refuse_unusable()
-        self.levels = self.collect_levels()
 
-    def cut_ground(
-        self, rings: list[list[Place]], passages: tuple[Passage, ...]
-    ) -> list[GroundCell]:
-        """Return the cells of the ground within `rings`, and keep where the feet of walls bend."""
-        self.bends = self.find_bends(rings)
-        return cut_cells(shapely.Polygon(rings[0], rings[1:]), passages)
+def draw_ground(solid: Solid) -> shapely.Polygon:
+    """Return the ground of a solid on one level in plan, on the grid."""
+    rings = [ring for lid in list_lids(solid, GROUND) for ring in lid.rings]
+    outer, *holes = ([corner[:2] for corner in ring] for ring in rings)
+    return shapely.Polygon(outer, holes)
 
-    def find_bends(self, rings: list[list[Place]]) -> set[Place]:
-        """Return the places at which the feet of walls along rings bend."""
-        if self.profile is None:
-            return set()
-        bends: set[Place] = set()
-        for start, end in (edge for ring in rings for edge in list_edges(ring)):
-            knots = self.profile.place_knots(*(np.array([start, end]) * GRID_M))
-            bends |= {(x, y) for x, y in np.rint(knots / GRID_M).astype(int).tolist()}
-        return bends
 
-    def node_cells(self, ground: list[list[Place]]) -> list[list[list[Place]]]:
-        """Return rings of all cells with every place on their edges: corners and bends of walls."""
-        rings = [list_rings(cell.polygon) for cell in self.cells]
-        pool = {place for ring in [*ground, *itertools.chain(*rings)] for place in ring}
-        self.pool = np.array(sorted(pool | self.bends))
-        return [[self.node_ring(ring) for ring in cell_rings] for cell_rings in rings]
+def place_knots(rings: list[list[Place]], underside: Underside) -> set[Place]:
+    """Return the places at which the feet of walls along rings bend."""
+    if not underside.terrain:
+        return set()
+    profile = Profile(underside.terrain)
+    bends: set[Place] = set()
+    for start, end in (edge for ring in rings for edge in list_edges(ring)):
+        knots = profile.place_knots(*(np.array([start, end]) * GRID_M))
+        bends |= {(x, y) for x, y in np.rint(knots / GRID_M).astype(int).tolist()}
+    return bends
 
-    def node_ring(self, ring: list[Place]) -> list[Place]:
-        return [
-            place
-            for start, end in list_edges(ring)
-            for place in (start, *self.find_on_edge(start, end))
-        ]
 
-    def find_on_edge(self, start: Place, end: Place) -> list[Place]:
-        """Return the places between the ends of an edge that lie on it, in its order."""
-        inner = list_between(start, end, self.pool, self.on_edge_units)
-        return [(x, y) for x, y in self.pool[inner].tolist()]
+def node_rings(
+    plans: list[list[list[Place]]], others: set[Place], corners: np.ndarray, reach: float
+) -> list[list[list[Place]]]:
+    """Return the rings of areas with all of their and of `others` places on their edges.
 
-    def measure_ground(self, cap: Cap) -> dict[Place, int]:
-        """Return the height of the ground at every place of a cell."""
-        places = sorted({place for rings in self.rings for ring in rings for place in ring})
-        if self.profile is None:
-            return dict.fromkeys(places, self.z_base)
-        xy = np.array(places, float)
-        z = np.minimum(self.profile.height_at(xy * GRID_M) / GRID_M, cap(xy))
-        return dict(zip(places, np.floor(z).astype(int).tolist(), strict=True))
+    These lie within `reach` of an edge. Places beside one of the `corners` (n, 2) are that corner.
+    """
+    pool = np.array(sorted(others.union(*itertools.chain(*plans))))
 
-    def refuse_unusable(self) -> None:
-        """Raise CompositionError for a passage that is too low, or too high for the roof."""
-        roofs = self.solid.select_faces(ROOF)
-        for cell, rings in zip(self.cells, self.rings, strict=True):
-            if cell.ceiling is None:
-                continue
-            ground = max(self.ground[place] for ring in rings for place in ring)
-            if (cell.ceiling - ground) * GRID_M < LEAST_ROOM_M:
-                raise CompositionError(
-                    f"expected a passage at least {LEAST_ROOM_M:g} m high, got one of "
-                    f"{(cell.ceiling - ground) * GRID_M:.2f} m over the ground; raise its ceiling"
-                )
-            lowest = min(find_lowest_roof(self.solid, face, cell.polygon) for face in roofs)
-            if lowest - cell.ceiling * GRID_M < LEAST_ROOM_M:
-                raise CompositionError(
-                    f"expected a passage at least {LEAST_ROOM_M:g} m below the roof, got one "
-                    f"{lowest - cell.ceiling * GRID_M:.2f} m below it; lower its ceiling"
-                )
-
-    def find_bottom(self, cell: int, place: Place) -> int:
-        """Return the height at which the solid begins over a place of a cell."""
-        ceiling = self.cells[cell].ceiling
-        return self.ground[place] if ceiling is None else ceiling
-
-    def collect_levels(self) -> dict[Place, list[int]]:
-        """Return the heights of all corners over each place, in order."""
-        levels: dict[Place, set[int]] = {}
-        for vertex, (x, y, z) in enumerate(self.grid):
-            if vertex not in self.on_ground:
-                levels.setdefault((x, y), set()).add(z)
-        for number, rings in enumerate(self.rings):
-            for place in itertools.chain(*rings):
-                levels.setdefault(place, set()).add(self.find_bottom(number, place))
-        return {place: sorted(heights) for place, heights in levels.items()}
-
-    def close(self) -> Solid:
-        """Return the solid with its new faces."""
-        faces: list[tuple[list[list[Corner]], str, int]] = []
-        for number, face in enumerate(self.solid.faces):
-            if face.kind == WALL:
-                faces += [(rings, WALL, -1) for rings in self.lower_wall(number)]
-            elif face.kind != GROUND:
-                faces.append(([self.keep_ring(ring) for ring in face.rings], face.kind, face.part))
-        faces += [([ring], WALL, -1) for ring in self.list_inner_walls()]
-        for number in range(len(self.cells)):
-            faces += [(rings, kind, -1) for rings, kind in self.list_undersides(number)]
-        return number_faces(faces)
-
-    def keep_ring(self, ring: tuple[int, ...]) -> list[Corner]:
-        """Return the ring of a roof face."""
-        return [self.grid[vertex] for vertex in ring]
-
-    def lower_wall(self, number: int) -> list[list[list[Corner]]]:
-        """Return the rings of a wall, a face of the solid, with its new foot."""
-        return [[self.lower_ring(ring) for ring in self.solid.faces[number].rings]]
-
-    def lower_ring(self, ring: tuple[int, ...]) -> list[Corner]:
-        """Return the ring of a wall with its new foot."""
-        corners: list[Corner] = []
+    def node_ring(ring: list[Place]) -> list[Place]:
+        noded: list[Sequence[int]] = []
         for start, end in list_edges(ring):
-            if (end, start) in self.ground_edges:
-                corners += self.list_foot(self.grid[start][:2], self.grid[end][:2])
-            elif start not in self.on_ground:
-                corners.append(self.grid[start])
-        return self.pass_levels(corners)
+            between = list_between(start, end, pool, reach)
+            noded += [start, *pool[between].tolist()]
+        places = np.array(noded)
+        gaps = np.hypot(*(places[:, None] - corners).T)
+        is_beside = gaps.min(axis=0)[:, None] <= SAME_PLACE_UNITS
+        places = np.where(is_beside, corners[gaps.argmin(axis=0)], places)
+        is_first = (places != np.roll(places, 1, axis=0)).any(axis=1)
+        return [(x, y) for x, y in places[is_first].tolist()]
 
-    def list_foot(self, start: Place, end: Place) -> list[Corner]:
-        """Return the corners of a wall's foot from one end to the other."""
-        places = [start, *self.find_on_edge(start, end), end]
-        corners: list[Corner] = []
-        for a, b in itertools.pairwise(places):
-            if (a, b) not in self.cell_at:
-                raise CompositionError(
-                    "expected passages whose corners lie on the walls they cross, got one beside "
-                    "a wall; draw it across the outline"
-                )
-            cell = self.cell_at[a, b]
-            corners += [(*a, self.find_bottom(cell, a)), (*b, self.find_bottom(cell, b))]
-        return corners
+    return [[node_ring(ring) for ring in rings] for rings in plans]
 
-    def pass_levels(self, corners: list[Corner]) -> list[Corner]:
-        """Return a ring with every corner that upright edges pass, each once."""
-        ring: list[Corner] = []
-        for start, end in list_edges(corners):
-            if start == end:
-                continue
-            ring.append(start)
-            if start[:2] == end[:2]:
-                low, high = sorted((start[2], end[2]))
-                between = [z for z in self.levels[start[:2]] if low < z < high]
-                ring += [(*start[:2], z) for z in (between if start[2] < end[2] else between[::-1])]
-        return ring
 
-    def list_inner_walls(self) -> Iterable[list[Corner]]:
-        """Yield the walls beside passages, each as a ring seen from the passage."""
-        for (a, b), cell in self.cell_at.items():
-            other = self.cell_at.get((b, a))
-            if other is None:
-                continue
-            low = self.find_bottom(cell, a), self.find_bottom(cell, b)
-            high = self.find_upper_end((a, b), other)
-            if low[0] <= high[0] and low[1] <= high[1] and low != high:
-                yield self.pass_levels([(*a, low[0]), (*b, low[1]), (*b, high[1]), (*a, high[0])])
+def measure_ground(
+    places: Iterable[Place], solid: Solid, underside: Underside, cap: Cap
+) -> dict[Place, int]:
+    """Return the height of the ground at places."""
+    distinct = sorted(set(places))
+    if not underside.terrain:
+        z_base = list_lids(solid, GROUND)[0].rings[0][0][2]
+        return dict.fromkeys(distinct, z_base)
+    xy = np.array(distinct, float)
+    z = np.minimum(Profile(underside.terrain).height_at(xy * GRID_M) / GRID_M, cap(xy))
+    return dict(zip(distinct, np.floor(z).astype(int).tolist(), strict=True))
 
-    def find_upper_end(self, edge: tuple[Place, Place], other: int) -> tuple[int, int]:
-        """Return the heights at which a wall over an edge ends, up to the `other` cell's."""
-        return self.find_bottom(other, edge[0]), self.find_bottom(other, edge[1])
 
-    def list_undersides(self, number: int) -> Iterable[tuple[list[list[Corner]], str]]:
-        """Yield the faces below a cell: its ceiling, or the ground as level as it is."""
-        rings = [
-            [(*place, self.find_bottom(number, place)) for place in ring]
-            for ring in self.rings[number]
-        ]
-        heights = {corner[2] for ring in rings for corner in ring}
-        if len(heights) == 1:
-            kind = GROUND if self.cells[number].ceiling is None else CEILING
-            yield [ring[::-1] for ring in rings], kind
-            return
-        outer, *holes = ([corner[:2] for corner in ring] for ring in rings)
-        polygon = shapely.Polygon(outer, holes)
-        for triangle in shapely.get_parts(shapely.constrained_delaunay_triangles(polygon)):
-            places = shapely.get_coordinates(shapely.orient_polygons(triangle))[:3].astype(int)
-            yield [[(x, y, self.ground[x, y]) for x, y in places.tolist()][::-1]], GROUND
+def refuse_unusable(solid: Solid, area: shapely.Polygon, ceiling: int, ground: int) -> None:
+    """Raise CompositionError for a passage that is too low, or too high for the roof."""
+    if (ceiling - ground) * GRID_M < LEAST_ROOM_M:
+        raise CompositionError(
+            f"expected a passage at least {LEAST_ROOM_M:g} m high, got one of "
+            f"{(ceiling - ground) * GRID_M:.2f} m over the ground; raise its ceiling"
+        )
+    lowest = min(find_lowest_roof(solid, face, area) for face in solid.select_faces(ROOF))
+    if lowest - ceiling * GRID_M < LEAST_ROOM_M:
+        raise CompositionError(
+            f"expected a passage at least {LEAST_ROOM_M:g} m below the roof, got one "
+            f"{lowest - ceiling * GRID_M:.2f} m below it; lower its ceiling"
+        )
+
+
+def draw_lids(rings: list[list[Place]], ground: dict[Place, int]) -> Iterable[Lid]:
+    """Yield the lids of the ground: one where it is level, else triangles."""
+    corners = [[(*place, ground[place]) for place in ring[::-1]] for ring in rings]
+    if len({z for ring in corners for *_, z in ring}) == 1:
+        yield Lid(corners, GROUND)
+        return
+    outer, *holes = rings
+    triangles = shapely.constrained_delaunay_triangles(shapely.Polygon(outer, holes))
+    for triangle in shapely.orient_polygons(shapely.get_parts(triangles), exterior_cw=True):
+        places = shapely.get_coordinates(triangle)[:3].astype(int).tolist()
+        yield Lid([[(x, y, ground[x, y]) for x, y in places]], GROUND)
 
 
 def list_rings(polygon: shapely.Polygon) -> list[list[Place]]:
@@ -320,7 +247,7 @@ def cut_cells(area: shapely.Polygon, passages: Iterable[Passage]) -> list[Ground
     rest: shapely.Geometry = area
     for passage in passages:
         outline = shapely.transform(passage.outline, lambda xy: np.rint(xy / GRID_M))
-        outline = snap_corners(outline, area)
+        outline = snap_corners(outline, shapely.boundary(area), SNAP_UNITS)
         covered = intersect(outline, rest, 1.0)
         remainder = subtract(rest, covered, 1.0)
         slivers = [
@@ -341,22 +268,21 @@ def list_areas(geometry: shapely.Geometry) -> list[shapely.Polygon]:
     return [part for part in shapely.get_parts(geometry) if not part.is_empty]
 
 
-def snap_corners(outline: shapely.Polygon, area: shapely.Polygon) -> shapely.Geometry:
-    """Return a passage whose corners near the outline's lie on it."""
-    border = shapely.boundary(area)
-    corners = shapely.multipoints(shapely.get_coordinates(area))
+def snap_corners(area: shapely.Geometry, lines: shapely.Geometry, reach: float) -> shapely.Geometry:
+    """Return an area, its corners within the `reach` of `lines` moved onto them or their ends."""
+    corners = shapely.multipoints(shapely.get_coordinates(lines))
 
     def snap(xy: np.ndarray) -> np.ndarray:
         result = xy.copy()
         for number, point in enumerate(shapely.points(xy)):
-            for target in (corners, border):
-                if shapely.distance(point, target) <= SNAP_UNITS:
+            for target in (corners, lines):
+                if shapely.distance(point, target) <= reach:
                     nearest = shapely.shortest_line(point, target)
                     result[number] = np.rint(shapely.get_coordinates(nearest)[-1])
                     break
         return result
 
-    return shapely.make_valid(shapely.transform(outline, snap))
+    return shapely.make_valid(shapely.transform(area, snap))
 
 
 def find_lowest_roof(solid: Solid, face: Face, polygon: shapely.Polygon) -> float:
@@ -367,22 +293,6 @@ def find_lowest_roof(solid: Solid, face: Face, polygon: shapely.Polygon) -> floa
         return np.inf
     a, b, c = fit_plane(solid, face)
     return float((shapely.get_coordinates(shared) * GRID_M @ [a, b] + c).min())
-
-
-def number_faces(faces: Iterable[tuple[list[list[Corner]], str, int]]) -> Solid:
-    """Return the solid of faces given by their rings of corners."""
-    numbers: dict[Corner, int] = {}
-    numbered = tuple(
-        Face(
-            tuple(
-                tuple(numbers.setdefault(corner, len(numbers)) for corner in ring) for ring in rings
-            ),
-            kind,
-            part,
-        )
-        for rings, kind, part in faces
-    )
-    return Solid(np.round(np.array(list(numbers), float) * GRID_M, 4), numbered)
 
 
 SPACING_M = 1.0  # between samples along a wall; the lines have a vertex at least as often
