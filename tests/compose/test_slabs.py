@@ -52,6 +52,16 @@ def test_slabs_at_a_step_keep_their_thickness(rise, step):
     )
 
 
+@pytest.mark.parametrize("kind", ["walls", "roof"])
+def test_corners_stand_only_where_three_faces_meet(kind):
+    eaves = make_eaves([0.5, 0.3, 0.5, 0.3], kind=kind)
+    solid = add_eaves(build_pair(2.2, step=0.3), eaves).eaves.solid
+    faces_of = [
+        vertex for face in solid.faces for vertex in {v for ring in face.rings for v in ring}
+    ]
+    assert np.bincount(faces_of).min() >= 3
+
+
 def test_ceilings_are_parallel_to_the_roof_above():
     model = build_pair(3.0)  # one plane a side, over both parts
     solid = add_eaves(model, make_eaves([0.5, 0.3, 0.5, 0.3])).eaves.solid
