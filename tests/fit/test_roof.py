@@ -8,7 +8,7 @@ import shapely
 
 from hiproof.compose import compose
 from hiproof.fit.prices import compute_unit
-from hiproof.fit.roof import add, fit_building, read_parts, start_roof
+from hiproof.fit.roof import add, fit_building, read_parts
 from hiproof.fit.roof.accept import LOOP_ROUNDS, fit_roof, improve, try_move
 from hiproof.fit.roof.draw import (
     compute_height,
@@ -20,6 +20,7 @@ from hiproof.fit.roof.moves import ALL_MOVES, LEAVE_OUT, MOVE_COLUMNS, list_move
 from hiproof.fit.roof.price import know, price_roof
 from hiproof.fit.roof.regions import split_region
 from hiproof.fit.roof.site import make_site, split_convex
+from hiproof.fit.roof.start import start_roof
 from hiproof.fit.roof.tables import (
     VOLUME_COUNT,
     add_unknown,
@@ -29,7 +30,7 @@ from hiproof.fit.roof.tables import (
     place_volume,
 )
 from hiproof.fit.union.plan import lay_out_plan
-from hiproof.fit.union.search import find_volumes
+from hiproof.fit.union.search import find_volumes, lay_out_whole
 from hiproof.model import ROOF, Roof
 from hiproof.settings import Settings
 from hiproof.simulate import COMPOUND_KINDS, ScanSettings, random_compound, scan
@@ -50,12 +51,13 @@ def begin_roof(kind, seed=0):
     points, outline = scan_compound(kind, seed)
     settings = Settings().compound
     plan = lay_out_plan(points, outline)
-    volumes, _, scene = find_volumes(plan, outline, settings)
-    plan_outline = shapely.transform(outline, plan.frame.uv_plan)
-    site = make_site(scene, plan_outline, compute_unit(plan.density, settings), plan.border)
-    roof = start_roof(volumes, scene, site)
+    whole = lay_out_whole(plan, outline, settings)
+    unit = compute_unit(plan.density, settings)
+    site = make_site(whole.scene, whole.outline, unit, plan.border)
+    volumes = find_volumes(whole, settings)
+    roof = start_roof(volumes, whole.scene.turn, site)
     fit_roof(roof, site, 2)
-    return roof, site, plan_outline, (volumes, scene, site)
+    return roof, site, whole.outline, (volumes, whole.scene.turn, site)
 
 
 def improve_all(roof, site):

@@ -8,7 +8,7 @@ import pytest
 import shapely
 
 from hiproof.fit.roof.site import make_site
-from hiproof.fit.roof.start import make_roof, put_on_walls
+from hiproof.fit.roof.start import start_roof
 from hiproof.fit.shapes.composite import combine_parts
 from hiproof.fit.union.allowed import list_allowed_shapes
 from hiproof.fit.union.plan import lay_out_plan
@@ -61,8 +61,7 @@ def test_a_side_lies_on_a_wall_near_it_unless_points_lie_elsewhere(end, drawn_en
     plan, scene = lay_out_scene(np.random.default_rng(0), outline, volumes)
     site = make_site(scene, shapely.transform(outline, plan.frame.uv_plan), 3.0, np.zeros((3, 0)))
     volumes[1, U1] = drawn_end
-    roof = make_roof(volumes, scene.turn, True)
-    put_on_walls(roof, 1, site, False)
+    roof = start_roof(volumes, scene.turn, site)
     ends = -roof.half_planes[1, :2, 2] * roof.half_planes[1, :2, 0]
     assert ends == pytest.approx([-4.0, place], abs=1e-9)
 

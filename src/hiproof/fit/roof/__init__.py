@@ -32,7 +32,7 @@ from ...model import Part, Piece, as_xyz
 from ...primitives.catalogue import CATALOGUE, CURVED
 from ...primitives.family import name_among
 from ...read.plausible import is_plausible
-from ...settings import Settings
+from ...settings import CompoundSettings, Settings
 from ..prices import compute_unit
 from ..shapes.clamp import clamp_parts
 from ..shapes.composite import combine_parts
@@ -41,11 +41,10 @@ from ..shapes.custom import fit_custom_shapes
 from ..shapes.regions import exclude_parts, list_polygons
 from ..shapes.shown import find_highest, keep_visible
 from ..union.fit import BuildingFit
-from ..union.objective import is_base_visible
 from ..union.outline import draw_outline
 from ..union.plan import Plan, lay_out_plan
-from ..union.scene import VISIBLE_DEPTH_M, Scene, place_nodes
-from ..union.search import SEARCH_POINTS, find_volumes
+from ..union.scene import VISIBLE_DEPTH_M, place_nodes
+from ..union.search import SEARCH_POINTS, find_volumes, lay_out_whole
 from ..union.whole import Whole
 from .accept import LOOP_ROUNDS, improve
 from .add import add_volumes
@@ -56,8 +55,8 @@ from .parts import name_planes
 from .price import Site
 from .regions import list_places
 from .site import make_site
-from .start import make_roof, put_on_walls
-from .tables import VOLUME_COUNT, Tables, make_tables_like
+from .start import start_roof
+from .tables import Tables, make_tables_like
 
 __all__ = ["BuildingFit", "fit_building"]
 
@@ -95,9 +94,10 @@ def fit_building(
         )
     settings = settings or Settings()
     types = settings.fit.types
-    volumes, value, scene = find_volumes(plan, outline, settings.compound, types)
-    xy = plan.frame.xy_local(np.column_stack(place_nodes(scene, VISIBLE_DEPTH_M)))
-    visible = keep_visible(name_volumes(volumes, outline, plan, scene, settings), xy)
+    whole = lay_out_whole(plan, outline, settings.compound, types)
+    xy = plan.frame.xy_local(np.column_stack(place_nodes(whole.scene, VISIBLE_DEPTH_M)))
+    drawn, price = draw_parts(whole, outline, settings)
+    visible = keep_visible(drawn, xy)
     parts = fit_custom_shapes(combine_parts(visible, types), points_local, settings)
     parts = fit_curved_shapes(parts, plan.points, outline, settings)
     parts = [restrict_type(part, types, points_local) for part in parts]
@@ -106,42 +106,37 @@ def fit_building(
     if exclude_parts(parts, visible):  # new ones may hide others
         parts = keep_visible(parts, xy, widest_m2=0.0)
     unexplained = measure_unexplained_share(parts, plan, settings.compound.tolerance_m)
-    return BuildingFit(tuple(parts), outline, value, scene.n, unexplained)
+    return BuildingFit(tuple(parts), outline, price, whole.scene.n, unexplained)
 
 
-def name_volumes(
-    volumes: np.ndarray, outline: shapely.Polygon, plan: Plan, scene: Scene, settings: Settings
-) -> list[Part]:
-    """Draw the search's volumes, improve them until no move saves, and name them as parts."""
-    plan_outline = shapely.transform(outline, plan.frame.uv_plan)
-    unit = compute_unit(plan.density, settings.compound)
-    types = settings.fit.types
-    keeps_shapes = bool(types) and not {*CATALOGUE} <= {*types, *CURVED}
-    site = make_site(scene, plan_outline, unit, plan.border, keeps_shapes)
-    roof = start_roof(volumes, scene, site)
-    improve_roof(roof, site, Whole(scene, plan, outline))
-    return read_parts(roof, site, plan_outline, plan, types)
+def draw_parts(
+    whole: Whole, outline: shapely.Polygon, settings: Settings
+) -> tuple[list[Part], float]:
+    """Draw the search's volumes, improve them until no move saves, and name them as parts.
 
-
-def improve_roof(roof: Tables, site: Site, whole: Whole) -> None:
-    """Improve a roof until no move saves.
-
-    Volumes are added where points of the `whole` are unexplained, if the search has not seen all of
-    them.
+    Also returns the price (points) of the drawn roof.
     """
+    scene, plan, types = whole.scene, whole.plan, settings.fit.types
+    unit = compute_unit(plan.density, settings.compound)
+    keeps_shapes = bool(types) and not {*CATALOGUE} <= {*types, *CURVED}
+    site = make_site(scene, whole.outline, unit, plan.border, keeps_shapes)
+    roof, price = find_roof(whole, site, settings.compound)
+    return read_parts(roof, site, whole.outline, plan, types), price
+
+
+def find_roof(whole: Whole, site: Site, settings: CompoundSettings) -> tuple[Tables, float]:
+    """Find a roof that no move makes cheaper, and its price (points).
+
+    Volumes are added where points are unexplained, if the search has not seen all of them.
+    `settings` are those of [compound].
+    """
+    roof = start_roof(find_volumes(whole, settings), whole.scene.turn, site)
     trial, drawing = make_tables_like(roof), make_drawing(len(roof.sides))
-    improve(roof, trial, site, drawing, np.ones(len(roof.sides), np.bool_), LOOP_ROUNDS)
+    price = improve(roof, trial, site, drawing, np.ones(len(roof.sides), np.bool_), LOOP_ROUNDS)
     is_thinned = whole.scene.n > SEARCH_POINTS  # else the search has seen every point
     if is_thinned and (added := add_volumes(roof, trial, site, drawing, whole)).any():
-        improve(roof, trial, site, drawing, added, LOOP_ROUNDS)
-
-
-def start_roof(volumes: np.ndarray, scene: Scene, site: Site) -> Tables:
-    """Return the tables of the search's volumes along walls."""
-    roof = make_roof(volumes, scene.turn, is_base_visible(volumes, scene))
-    for k in range(roof.counts[VOLUME_COUNT]):
-        put_on_walls(roof, k, site, False)
-    return roof
+        price = improve(roof, trial, site, drawing, added, LOOP_ROUNDS)
+    return roof, price
 
 
 def read_parts(

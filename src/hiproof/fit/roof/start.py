@@ -21,7 +21,7 @@ from ..union.volumes import (
 )
 from .ends import find_end
 from .moves import LINE_COSINE
-from .price import list_points, list_view, price_misfit, widen
+from .price import Site, list_points, list_view, price_misfit, widen
 from .tables import (
     FAR_M,
     LINE_COUNT,
@@ -44,13 +44,14 @@ MOST_SWING = 0.5 * np.sqrt(1.0 - LINE_COSINE**2)  # How far (of its length) an e
 PARALLEL_COSINE = 1.0 - 1e-12  # Cosine of the angle up to which two lines are parallel.
 
 
-def make_roof(volumes: np.ndarray, turns: np.ndarray, with_base: bool) -> Tables:
-    """Return the tables of volumes. The base is one `with_base`, or alone."""
-    numbers = [k for k in range(len(volumes)) if k > 0 or with_base or len(volumes) == 1]
-    size = ROOM * len(numbers) + 8
+def start_roof(volumes: np.ndarray, turns: np.ndarray, site: Site) -> Tables:
+    """Return the tables of the search's volumes (k, COLUMNS) along walls."""
+    size = ROOM * len(volumes) + 8
     roof = make_tables(size, 8 * size, 8 * size)
-    for k in numbers:
-        add_volume(roof, volumes[k], turns)
+    for volume in volumes:
+        add_volume(roof, volume, turns)
+    for k in range(len(volumes)):
+        put_on_walls(roof, k, site, False)
     return roof
 
 

@@ -14,7 +14,6 @@ from .moves import (
     change_ties,
     drop_planes,
     drop_volumes,
-    flatten,
     move_all_edges,
     refit_volume,
 )
@@ -64,7 +63,6 @@ def change_planes(volumes, scene, value, k, slopes):
     """Make all moves that change which planes volume k has, their ties and facings."""
     context = measure_context(volumes, scene.U, scene.V, scene.order, k)
     volumes, value = drop_planes(volumes, scene, value, k, context)
-    volumes, value = flatten(volumes, scene, value, k, context)
     volumes, value = change_ties(volumes, scene, value, k, context)
     volumes, value = face_walls(volumes, scene, value, k, context)
     return add_planes(volumes, scene, value, k, slopes, context)

@@ -2,7 +2,6 @@
 
     refit one volume, move its edges      after every other move
     drop a volume, a plane                what does not pay is dropped
-    flatten                               slopes next to level become a level top
     tie, untie                            equal slopes
     let it join again                     a volume that replaces becomes part of the max
     add an end, a level top               a gable becomes a hip, a hip a mansard
@@ -33,15 +32,11 @@ from .volumes import (
     SLOPE0,
     TIE,
     U0,
-    U1,
-    V0,
-    V1,
     count_planes,
     count_slopes,
     equalise_slopes,
     find_lowest,
     is_within,
-    measure_run,
     read_coefficients,
     read_rectangle,
 )
@@ -54,7 +49,6 @@ SLOPES_APART = 0.02  # Least difference (rise over run) between two of them.
 END_SEEDS = 16  # Points through which a new plane is tried.
 FEWEST_SEEDS = 3  # Fewest points through which a new plane may pass for any to be tried.
 POINTS_AT_ONCE = 64  # Points between two checks whether a new plane can still be the best.
-ALMOST_LEVEL = 0.15  # A flatter plane (rise over run) may as well be level.
 
 
 @compiled
@@ -139,28 +133,6 @@ def remove_plane(row, plane):
     row[OFFSET0 + plane] = np.inf
     if plane < LEVEL:
         row[SLOPE0 + plane] = row[LEAN0 + plane] = 0.0
-
-
-@compiled
-def flatten(volumes, scene, value, k, context):
-    """Replace the nearly level planes of volume k by one level top."""
-    if volumes[k, OFFSET0 + LEVEL] < np.inf:
-        return volumes, value
-    trial, count = volumes.copy(), 0
-    u, v = 0.5 * (volumes[k, U0] + volumes[k, U1]), 0.5 * (volumes[k, V0] + volumes[k, V1])
-    total = 0.0
-    for plane in range(N_SIDES):
-        if volumes[k, OFFSET0 + plane] < np.inf and volumes[k, SLOPE0 + plane] < ALMOST_LEVEL:
-            count += 1
-            total += volumes[k, OFFSET0 + plane] + volumes[k, SLOPE0 + plane] * measure_run(
-                volumes[k], plane, u, v
-            )
-            remove_plane(trial[k], plane)
-    if count == 0:
-        return volumes, value
-    trial[k, OFFSET0 + LEVEL] = total / count
-    trial, trial_value = settle_move(trial, scene, k, value, EVERYWHERE, context)
-    return (trial, trial_value) if trial_value < np.inf else (volumes, value)
 
 
 @compiled

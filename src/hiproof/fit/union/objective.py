@@ -122,7 +122,12 @@ def is_loose(volumes, scene, k, edge):
     return True
 
 
-def is_base_visible(volumes: np.ndarray, scene) -> bool:
-    """Return whether the base roofs a noticeable share of the outline."""
+def is_base_visible(volumes: np.ndarray, scene, count_points: bool = False) -> bool:
+    """Return whether the base is alone, or roofs a noticeable share of the outline.
+
+    Where it ends at the border of a block, points count, each as half (`count_points`).
+    """
     _, top = compute_roof_heights(volumes, scene.U, scene.V, scene.order)
-    return bool(scene.weight[scene.n :][top[scene.n :] == 0].sum() > BASE_SHARE * scene.n)
+    cells = scene.weight[scene.n :][top[scene.n :] == 0].sum()
+    points = 0.5 * np.count_nonzero(top[: scene.n] == 0) * count_points
+    return len(volumes) == 1 or bool(max(cells, points) > BASE_SHARE * scene.n)

@@ -9,42 +9,45 @@ import numpy as np
 import shapely
 
 from .allowed import list_allowed_shapes
+from .blocks import HeightRaster
 from .grow import grow
-from .large import find_in_blocks
+from .large import search_box
 from .moves import refit_volumes
-from .objective import compute_objective
+from .objective import compute_objective, is_base_visible
 from .plan import Plan
 from .prices import LARGE_ROOF_M2, compute_unit_points
-from .scene import Scene, find_directions, make_scene, thin_scene
+from .scene import find_directions, make_scene, thin_scene
 from .trim import trim
+from .volumes import make_base
+from .whole import Whole
 
 SEARCH_POINTS = 600  # Points in which structure is searched.
 
 
-def find_volumes(
+def lay_out_whole(
     plan: Plan, outline: shapely.Polygon, settings, types: tuple[str, ...] = ()
-) -> tuple[np.ndarray, float, Scene]:
-    """Find the volumes (k, COLUMNS) of the roof over `outline`.
+) -> Whole:
+    """Return the scene of all points with what is searched block by block.
 
-    Also returns their objective (points) and the scene of all points. `settings` are those of
-    [compound]. Volumes have only shapes that parts of `types` need, any without types.
+    `settings` are those of [compound]. Volumes have only shapes that parts of `types` need, any
+    without types.
     """
-    count = len(plan.cloud.u)
+    evidence = compute_unit_points(plan.density, outline.area, settings)
+    angles, allowed = find_directions(outline, plan), list_allowed_shapes(types)
+    scene = make_scene(plan, outline, angles, evidence, settings.tolerance_m, allowed)
+    return Whole(scene, plan, outline)
+
+
+def find_volumes(whole: Whole, settings) -> np.ndarray:
+    """Find the volumes (k, COLUMNS) of a roof. `settings` are those of [compound]."""
+    scene, count = whole.scene, whole.scene.n
+    if whole.area > LARGE_ROOF_M2 and count > SEARCH_POINTS:
+        blocks = search_box(whole, HeightRaster(whole), whole.box, whole.area)
+        return np.concatenate(blocks or [make_base(float(whole.z.min()))])
     numbers = np.arange(min(count, SEARCH_POINTS)) * count // min(count, SEARCH_POINTS)
-    evidence = [
-        compute_unit_points(plan.density * share, outline.area, settings)
-        for share in (len(numbers) / count, 1.0)
-    ]
-    angles = find_directions(outline, plan)
-    full_scene = make_scene(
-        plan, outline, angles, evidence[1], settings.tolerance_m, list_allowed_shapes(types)
-    )
-    # Otherwise, the search of a house uses every point.
-    if outline.area > LARGE_ROOF_M2 and count > SEARCH_POINTS:
-        volumes = find_in_blocks(plan, outline, full_scene)
-        return volumes, compute_objective(volumes, full_scene), full_scene
-    scene = thin_scene(full_scene, numbers, evidence[0])
-    volumes, _ = grow(scene)
-    value = compute_objective(volumes, full_scene)
-    volumes, value = refit_volumes(volumes, full_scene, value)
-    return *trim(volumes, full_scene, value), full_scene
+    density = whole.plan.density * len(numbers) / count
+    thinned = thin_scene(scene, numbers, compute_unit_points(density, whole.area, settings))
+    volumes, _ = grow(thinned)
+    volumes, value = refit_volumes(volumes, scene, compute_objective(volumes, scene))
+    volumes, _ = trim(volumes, scene, value)
+    return volumes if is_base_visible(volumes, scene) else volumes[1:]
