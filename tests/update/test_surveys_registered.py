@@ -179,6 +179,38 @@ def test_a_shift_beyond_the_bound_is_not_taken_off():
     assert found.clear_xyz[2] == pytest.approx(1.6, abs=0.03)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_a_roof_that_slopes_one_way_takes_its_height_from_the_ground(seed):
+    """It may lie aside or higher, so its height alone is not clear."""
+    rng, shift = np.random.default_rng(seed), np.array([0.06, -0.05, 0.4])
+    part = make_part("monopitch", SHED, 0.3, np.array([0.0, 0.0, 6.0]))
+    roof = Roof((part,), part.outlines[0], LocalFrame(np.zeros(3)))
+    around = rng.uniform(-15, 15, (80, 2))
+    ground = np.column_stack([around, rng.normal(0.4, 0.04, 80), np.zeros((80, 2))])
+    sample = SampledRoof(roof, scan(rng, roof), scan(rng, roof) + shift, ground)
+    found = register_surveys([sample], READ)
+    assert found.clear_xyz[2] == pytest.approx(0.4, abs=0.12) and not found.doubt
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_roofs_that_became_steeper_are_no_shift_aside(seed):
+    """One of their slopes fits a shift, and a level roof fits any."""
+    rng, samples = np.random.default_rng(seed), []
+    for k, place in enumerate(rng.uniform(0, SIDE_M, (4, 2))):
+        width, rise = rng.uniform(7, 10), rng.uniform(2.5, 3.5)
+        sizes = {"width": width, "length": width + 3.0}
+        roofs = []
+        for height in (rise, rise + 0.6):
+            kind = "flat" if k == 0 else "gable"
+            heights = {} if k == 0 else {"height": height}
+            part = make_part(kind, sizes | heights, 0.0, np.array([0.0, 0.0, 5.0]))
+            roofs.append(Roof((part,), part.outlines[0], LocalFrame(np.array([*place, 0.0]))))
+        around = place + rng.uniform(-15, 15, (80, 2))
+        ground = np.column_stack([around, rng.normal(0, 0.04, 80), np.zeros((80, 2))])
+        samples.append(SampledRoof(roofs[0], scan(rng, roofs[0]), scan(rng, roofs[1]), ground))
+    assert register_surveys(samples, READ).clear_xyz.tolist() == [0.0, 0.0, 0.0]
+
+
 @pytest.mark.parametrize(("text", "shift"), [("off", (0, 0, 0)), ("0,0.1,2.5", (0, 0.1, 2.5))])
 def test_a_shift_that_is_given_is_taken_off_as_it_is(text, shift):
     read = dataclasses.replace(READ, shift=text)

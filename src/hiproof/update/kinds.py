@@ -47,8 +47,9 @@ LARGER = 0.1
 AS_ONE_SHARE = 0.65
 """Share of a part's cells, or of a building's, from which on it changed as one."""
 
-LEAST_ASIDE_M2 = 1.0
-"""Area (m2) that lies bare where a roof stands elsewhere: of one that is turned, its corners."""
+LEAST_BARE_M2 = 1.0
+"""Area (m2) of cells that lie bare where a part was lost or a roof stands elsewhere: of one that is
+turned, its corners. Cells along walls count for neither side."""
 
 SAME_PART = 0.6
 """Intersection over union from which on two parts take the same place."""
@@ -173,7 +174,7 @@ def name_whole(inside: np.ndarray, sides: BeforeAfter) -> Difference | None:
         moved.mean() >= AS_ONE_SHARE and moves_together(d) and has_all(moved, sides.parts[0])
     ):
         kind = ChangeKind.ROOF_RAISED if np.median(d) > 0 else ChangeKind.ROOF_LOWERED
-    elif bare.sum() * sides.comparison.cell_m2 >= LEAST_ASIDE_M2:
+    elif bare.sum() * sides.comparison.cell_m2 >= LEAST_BARE_M2:
         is_other = share_of_part(~bare, inside) >= HALF and not moves_together(d[~bare])
         kind = ChangeKind.REBUILT if is_other else None
     elif is_same_place(pair, sides) and not bare.any() and not moves_together(d[inside]):

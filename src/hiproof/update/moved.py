@@ -28,12 +28,11 @@ from .epochs import Surveys
 from .judge import (
     FEWEST_COMPARED,
     OVER_GROUND_M,
-    SMALLEST_M2,
     ChangeVerdict,
     find_bare,
     judge_building,
 )
-from .kinds import moves_together
+from .kinds import LEAST_BARE_M2, moves_together
 from .lineage import lift_part, measure_lift, show_parts, unite_lifts
 from .places import move_to_frame
 
@@ -159,7 +158,7 @@ class LostParts:
         is_bare = np.logical_and(*find_bare(c, earlier, verdict.ground))
         bare = np.intersect1d(np.concatenate(changed), np.flatnonzero(is_bare))
         area_m2 = len(bare) * c.cell_m2
-        if area_m2 < SMALLEST_M2:
+        if area_m2 < LEAST_BARE_M2:
             return None
         is_low = c.points[:, 2] - verdict.ground.height_at(c.points) < OVER_GROUND_M
         xy = c.points[:, :2]

@@ -271,6 +271,8 @@ def register_surveys(samples: Iterable[SampledRoof], read: ReadSettings) -> Surv
     else:
         shift, sigma = solve_shift(rows, ground, float(np.median(heights)))
         shift[:2] *= any(shows_aside(row, shift) for row in rows)
+        if len(ground):  # slopes that face one way leave their height open, the ground does not
+            sigma[2] = min(sigma[2], ROOF_ERROR_M)
     level, aside = measure_level(ground, shift), count_aside(rows, ground, shift)
     ground[:, 2] += ground[:, 3:] @ shift[:2]
     offsets = np.array([np.median(residuals - design @ shift) for design, residuals in rows])

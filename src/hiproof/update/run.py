@@ -33,6 +33,7 @@ from .earlier import choose_read_settings, read_earlier
 from .epochs import SURVEYS_FILE, Surveys
 from .outside import CELLS_FOLDER, load_roofs_outside, sort_survey
 from .plan import make_update_plan
+from .register import read_shift
 from .request import EACH_BUILDING, WHOLE_CITY, UpdateRequest
 from .solve import update_tile
 
@@ -87,6 +88,7 @@ def update_area(
         )
     refuse_same_clouds(request.clouds, earlier.clouds)
     settings = choose_read_settings(earlier.settings).replace(changes or {})
+    read_shift(settings.read.shift)  # one that is none is refused before work is spent
     date = find_survey_date(request.clouds, request.date, earlier.date, earlier.clouds)
     request = dataclasses.replace(
         request, settings=settings, date=date, overrides=request.overrides or earlier.overrides

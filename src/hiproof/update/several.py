@@ -27,7 +27,7 @@ from ..garbage import collect_rarely
 from ..write.files import save_text
 from .best import EPOCHS_FILE, load_shifts, solve_best_tile
 from .epochs import compare_ground, find_ground, select_roof, sort_epoch
-from .register import SampledRoof, SurveyShift, draw_buildings, register_surveys
+from .register import SampledRoof, SurveyShift, draw_buildings, read_shift, register_surveys
 
 
 def reconstruct_epochs(request: Request, progress: Progress = lambda *_: None) -> Summary:
@@ -36,6 +36,7 @@ def reconstruct_epochs(request: Request, progress: Progress = lambda *_: None) -
     Raises what `reconstruct_area` does, and InputError without footprints.
     """
     refuse_unusable(request)
+    read_shift(request.settings.read.shift)
     if not request.footprints:
         raise InputError(
             "expected --footprints with --epoch, got none; outlines that are found in points of "
