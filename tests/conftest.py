@@ -23,10 +23,8 @@ from tiny_town import write_town
 
 
 def pytest_configure(config):
-    """Compile before several processes test, so that no two compile the same.
-
-    A shell has what it starts in the background ignore Ctrl-C, and processes that tests interrupt
-    would ignore it too.
+    """Compile before several processes test, so that no two compile the same. A shell has what it
+    starts in the background ignore Ctrl-C, and processes that tests interrupt would ignore it too.
     """
     gc.set_threshold(RARELY)  # imports and tests make objects that stay
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:

@@ -1,5 +1,4 @@
 """A finished run over the tiny town whose roofs are all wrong: flat, as nothing else was allowed.
-
 What a person mends.
 """
 

@@ -35,8 +35,6 @@ def accessor_values(document, binary, index):
     values = values.reshape(-1, width) if width > 1 else values
     assert len(values) == accessor["count"]
     if "min" in accessor:
-        assert (
-            values.min(axis=0).tolist() == accessor["min"]
-            and values.max(axis=0).tolist() == accessor["max"]
-        )
+        assert values.min(axis=0).tolist() == accessor["min"]
+        assert values.max(axis=0).tolist() == accessor["max"]
     return values

@@ -51,9 +51,7 @@ def forest(rng: np.random.Generator, side_m: float = 60.0, density: float = 8.0)
 
 
 def make_house_under_tree(rng: np.random.Generator, share: float, density: float = 10.0):
-    """A gable house in the middle of a lawn, `share` of it under crowns; the scan and the
-    building.
-    """
+    """A gable house on a lawn, `share` of it under crowns; the scan and the building."""
     building = random_building(rng, "gable", kappa=0.0)
     x0, y0, x1, y1 = building.outline.bounds
     crowns = draw_crowns(rng, 60.0, 3.0)

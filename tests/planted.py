@@ -93,9 +93,7 @@ def solve_hungry(folder, tile, terrain=None, avoid=()):
 
 
 def read_jobs_from(path):
-    """A stand-in for reading footprints that takes those of `path`, whatever address is
-    asked for.
-    """
+    """A stand-in for reading footprints that takes those of `path`, whatever the address."""
     return lambda *_: (make_jobs(read_footprints(path)), (), None)
 
 

@@ -23,12 +23,9 @@ EDIT_KINDS = ("parameter", "type", "ridge", "eave", "turn", "move", "size", "add
 
 
 def random_edit(rng: np.random.Generator, building: Building) -> tuple[str, int, dict[str, Any]]:
-    """Draw (kind, part, change) for `Building.with_part`.
-
-    It is for `without_part` where the kind is "remove".
-
-    Parameters become anything from a hundredth to four times what they were, now and then below
-    zero or none at all; types any other; parts go up to 5 m aside, and turn anywhere.
+    """Draw (kind, part, change) for `Building.with_part`. It is for `without_part` where the kind
+    is "remove". Parameters become anything from a hundredth to four times what they were, now and
+    then below zero or none at all; types any other; parts go up to 5 m aside, and turn anywhere.
     """
     kind = str(rng.choice(EDIT_KINDS))
     index = int(rng.integers(len(building.parts)))

@@ -1,9 +1,6 @@
 """`python range_server.py FOLDER LOG`: Python's file server with what it lacks, ranges of bytes.
-
-Prints its port.
-
-A process of its own: GDAL waits for its answers without letting other Python threads run. Ranges
-asked for go to LOG.
+Prints its port. A process of its own: GDAL waits for its answers without letting other Python
+threads run. Ranges asked for go to LOG.
 """
 
 import subprocess

@@ -88,9 +88,7 @@ def feature(id, kind, solid):
 
 
 def sample_points(seed=0, noise=0.02, density=4.0):
-    """Points (n, 3) in world coordinates on the roofs of both sample solids, with vertical
-    noise.
-    """
+    """Points (n, 3) in the world on the roofs of both sample solids, with vertical noise."""
     rng = np.random.default_rng(seed)
     x, y = rng.uniform(0, 8, int(96 * density)), rng.uniform(0, 12, int(96 * density))
     gable = np.column_stack([x, y, 7 - 0.75 * np.abs(x - 4)])

@@ -11,7 +11,6 @@ import shapely
 from click.testing import CliRunner
 
 from hiproof.city.plan.prepare import make_plan
-from hiproof.city.plan.work_plan import make_jobs
 from hiproof.city.request import Request
 from hiproof.city.run import reconstruct_area
 from hiproof.cli.app import app
@@ -64,15 +63,6 @@ def test_every_option_of_a_setting_is_there_and_tells_what_the_setting_tells():
     assert [option.opts[0] for option in OPTIONED] == declared
     for option in OPTIONED:
         assert option.setting[1].metadata["help"] in option.help
-
-
-def test_options_and_settings_are_told_once():
-    own_parameters = set(PARAMETERS) - {option.name for option in OPTIONED}
-    assert own_parameters.isdisjoint(
-        field.name
-        for section in dataclasses.fields(Settings)
-        for field in dataclasses.fields(section.default_factory)
-    )
 
 
 def test_a_settings_file_beside_the_data_is_found_and_named(tmp_path, caplog):
@@ -137,9 +127,8 @@ def test_a_choice_that_leaves_nothing_gets_a_sentence(options, message, houses):
 @pytest.mark.parametrize("ending", ["geojson", "shp", "fgb"])
 def test_a_condition_that_no_database_reads_gets_the_same_sentence(ending, tmp_path):
     path = write_layer(tmp_path / f"houses.{ending}", HOUSES.values(), {"year": np.arange(5)})
-    with pytest.raises(
-        InputError, match=r"--where in SQL on the attributes of .*\(year\), got: 'height > 3'"
-    ):
+    sentence = r"--where in SQL on the attributes of .*\(year\), got: 'height > 3'"
+    with pytest.raises(InputError, match=sentence):
         read_footprints(path, where="height > 3")
 
 
@@ -148,9 +137,8 @@ def test_a_box_that_is_none_gets_a_sentence(text, tmp_path):
     result = CliRunner().invoke(
         app, ["reconstruct", "a.laz", "--out", str(tmp_path), f"--bbox={text}"]
     )
-    assert isinstance(result.exception, SettingsError) and "--bbox as xmin,ymin,xmax,ymax" in str(
-        result.exception
-    )
+    assert isinstance(result.exception, SettingsError)
+    assert "--bbox as xmin,ymin,xmax,ymax" in str(result.exception)
 
 
 def test_without_footprints_the_box_chooses_among_what_is_found(town_files, tmp_path):
@@ -163,9 +151,8 @@ def test_without_footprints_the_box_chooses_among_what_is_found(town_files, tmp_
     x, y, *_ = everything[2].area.buffer(5.0).bounds
     with pytest.raises(InputError, match=r"buildings in --bbox .*, got none"):
         make_plan(dataclasses.replace(request, bbox=(x, y, x + 0.01, y + 0.01)))
-    with pytest.raises(
-        InputError, match=r"meets the clouds, which lie in [\d.,]+, got -9,-9,-8,-8"
-    ):
+    sentence = r"meets the clouds, which lie in [\d.,]+, got -9,-9,-8,-8"
+    with pytest.raises(InputError, match=sentence):
         make_plan(dataclasses.replace(request, bbox=(-9.0, -9.0, -8.0, -8.0)))
 
 
@@ -178,17 +165,3 @@ def test_without_footprints_a_building_in_the_box_comes_as_without_a_box(town_fi
     box = tuple(np.add(box, [origin[0], origin[1]] * 2).tolist())
     reconstruct_area(dataclasses.replace(request, out=tmp_path / "part", bbox=box))
     assert by_id(tmp_path / "part") == {min(whole): whole[min(whole)]}
-
-
-def test_a_plan_holds_the_footprints_chosen(town_files, tmp_path):
-    request = Request(
-        (town_files[0],), tmp_path, town_files[1], where="id in ('house-1', 'house-3')"
-    )
-    expected = [
-        f
-        for f in read_footprints(town_files[1], target_crs="EPSG:7415")
-        if f.id in ("house-1", "house-3")
-    ]
-    assert [job.id for job in make_plan(request).jobs] == [
-        job.id for job in make_jobs(tuple(expected))
-    ]

@@ -115,19 +115,6 @@ def test_the_common_shift_depends_on_the_files_alone(shifted_request, tmp_path):
     assert plan_of(make_request(tmp_path / "reordered", town)).registration == registration
 
 
-def test_the_plan_keeps_what_was_moved(shifted_request, tmp_path):
-    plan = plan_of(replace(shifted_request, where="id in ('house-7', 'house-8')"))
-    plan.save(tmp_path / "plan.jsonl")
-    loaded = WorkPlan.load(tmp_path / "plan.jsonl")
-    assert loaded.registration == plan.registration and len(loaded.others) == len(plan.others) > 0
-    for job, other in zip(plan.jobs, loaded.jobs, strict=True):
-        assert (
-            job.area.wkb == other.area.wkb
-            and job.footprint.polygon.wkb == other.footprint.polygon.wkb
-        )
-        assert job.footprint.shift == other.footprint.shift == plan.registration.shift
-
-
 def test_footprints_in_place_stay_and_align_off_looks_for_nothing(tmp_path, shifted_request):
     plan = make_plan(make_request(tmp_path, scattered_houses()))
     assert not plan.registration.is_clear and plan.registration.length < 0.1

@@ -9,14 +9,13 @@ import numpy as np
 import pytest
 import shapely
 
-from hiproof.city.folder.ledger import Ledger, Outcome
+from hiproof.city.folder.ledger import Ledger
 from hiproof.city.plan.work_plan import Job, cut_into_tiles, neighbourhood
 from hiproof.city.work import queue
 from hiproof.city.work.executors import InProcess
 from hiproof.city.work.ground import (
     FAR_STEP_M,
     BareAround,
-    Cells,
     GroundAround,
     LowestAround,
     ModelAround,
@@ -27,7 +26,7 @@ from hiproof.city.work.processes import Processes
 from hiproof.city.work.sort import Reach
 from hiproof.city.work.tasks import WorkerLost
 from hiproof.read.terrain import TerrainChain
-from small_tasks import die_at_second_task, double
+from small_tasks import double
 
 
 def jobs_at(xy):
@@ -43,26 +42,6 @@ def test_each_building_is_owned_by_one_tile(max_jobs):
     owned = sorted(i for members in tiles.values() for i in members)
     assert owned == list(range(60))
     assert max(len(members) for members in tiles.values()) <= max_jobs
-
-
-def test_a_building_without_area_is_still_owned():
-    jobs = (Job(0, "empty", shapely.Polygon(), None),)
-    assert list(cut_into_tiles(jobs, 250.0, 100).values()) == [(0,)]
-
-
-def test_points_within_reach_equal_the_plain_test():
-    rng = np.random.default_rng(1)
-    xy = rng.uniform(-20, 60, (2000, 2))
-    jobs = jobs_at(rng.uniform(0, 40, (5, 2)))
-    roof, terrain = (np.array([neighbourhood(job, reach) for job in jobs]) for reach in (0.0, 3.0))
-
-    def plain(boxes):
-        return np.array([any((p >= b[:2]).all() and (p < b[2:]).all() for b in boxes) for p in xy])
-
-    indices = rng.permutation(len(xy))[:1500]
-    bits = Reach(roof, terrain).bits(xy, indices)
-    assert np.array_equal(bits & 1 > 0, plain(roof)[indices])
-    assert np.array_equal(bits & 2 > 0, plain(terrain)[indices])
 
 
 def sloped_ground(rng, n=20000, size=100.0):
@@ -149,50 +128,6 @@ def test_far_from_a_terrain_model_the_ground_is_unknown():
     assert np.isnan(terrain.height_at(np.array([[0.0, 0.0], [10.0, 5.0]]))).all()
 
 
-def test_ground_without_points_is_unknown():
-    box = np.array([0.0, 0.0, 10.0, 10.0])
-    for ground_class in (GroundAround, BareAround, LowestAround):
-        assert np.isnan(
-            make_ground(ground_class, Cells(np.zeros((0, 3))), box).height_at(
-                np.array([[5.0, 5.0]])
-            )
-        ).all()
-
-
-def test_lowest_points_do_not_depend_on_how_they_are_cut():
-    rng = np.random.default_rng(2)
-    points = rng.uniform(-5, 5, (500, 3))
-    whole = lowest_in_cells(points)
-    pieces = lowest_in_cells(
-        np.concatenate(
-            [lowest_in_cells(part) for part in np.array_split(rng.permutation(points), 7)]
-        )
-    )
-    assert np.array_equal(whole, pieces)
-    cells = {}
-    for x, y, z in points:
-        cell = (np.floor(x) + 0.5, np.floor(y) + 0.5)
-        cells[cell] = min(z, cells.get(cell, np.inf))
-    assert {(x, y) for x, y, _ in whole} == set(cells)
-    assert all(abs(cells[x, y] - z) < 1e-4 for x, y, z in whole)
-
-
-def test_the_ledger_remembers_after_being_closed(tmp_path):
-    path = tmp_path / "ledger.sqlite"
-    ledger = Ledger(path)
-    ledger.settle([(0, "a", b"0"), (1, "a", b"1"), (2, "b", b"2")], [])
-    ledger.put_tasks(0, {"a": 2, "b": 1})
-    ledger.finish(
-        "solve:a", "done", "", [Outcome(0, "x", "modelled", "good", "gable", "", 0.9, 0.01)]
-    )
-    ledger.close()
-    reopened = Ledger(path)
-    assert reopened.open_tasks("solve") == ["solve:b"]
-    assert reopened.counts("status") == {"modelled": 1}
-    reader = Ledger(path, read_only=True)
-    assert reader.counts("type") == {"gable": 1}
-
-
 def test_a_ledger_in_a_folder_that_cannot_be_written_is_read(tmp_path, monkeypatch):
     path = tmp_path / "ledger.sqlite"
     ledger = Ledger(path)
@@ -226,25 +161,6 @@ def test_workers_have_the_environment_and_the_folder_of_the_moment(tmp_path, mon
         assert (town, current) == (name, str(folder))
 
 
-def test_a_killed_worker_loses_its_tasks_but_not_the_others():
-    executor = Processes(2)
-    visible, lost = set(), set()
-    tasks = [(i,) for i in range(6)]
-    while tasks:
-        repeated = []
-        for task, result, error in executor.run(die_at_second_task, tasks):
-            if error is None:
-                visible.add(result)
-            else:
-                assert isinstance(error, WorkerLost)
-                lost.add(task[0])
-                repeated += [task] if task[0] != 2 else []
-        tasks = repeated
-    executor.close()
-    assert visible == {0, 1, 3, 4, 5}
-    assert 2 in lost
-
-
 @pytest.mark.parametrize("members", [(1, 2, 3), (2,)], ids=["among others", "alone"])
 def test_a_deadly_building_is_found_by_leaving_out_the_others(members, monkeypatch):
     """Building 2 ends its process; no task is tried more often than may be chance, and none that is
@@ -263,3 +179,36 @@ def test_a_deadly_building_is_found_by_leaving_out_the_others(members, monkeypat
     assert queue.solve_in_quarantine(executor, None, ("folder", "tile", None)) == ((2,), None)
     by_one = [((2, 3),), *[((1, 3),)] * queue.TRIES, ((1, 2),)] if len(members) > 1 else []
     assert attempts == [*[()] * queue.TRIES, *by_one, ((2,),)]
+
+
+def test_points_within_reach_equal_the_plain_test():
+    rng = np.random.default_rng(1)
+    xy = rng.uniform(-20, 60, (2000, 2))
+    jobs = jobs_at(rng.uniform(0, 40, (5, 2)))
+    roof, terrain = (np.array([neighbourhood(job, reach) for job in jobs]) for reach in (0.0, 3.0))
+
+    def plain(boxes):
+        return np.array([any((p >= b[:2]).all() and (p < b[2:]).all() for b in boxes) for p in xy])
+
+    indices = rng.permutation(len(xy))[:1500]
+    bits = Reach(roof, terrain).bits(xy, indices)
+    assert np.array_equal(bits & 1 > 0, plain(roof)[indices])
+    assert np.array_equal(bits & 2 > 0, plain(terrain)[indices])
+
+
+def test_lowest_points_do_not_depend_on_how_they_are_cut():
+    rng = np.random.default_rng(2)
+    points = rng.uniform(-5, 5, (500, 3))
+    whole = lowest_in_cells(points)
+    pieces = lowest_in_cells(
+        np.concatenate(
+            [lowest_in_cells(part) for part in np.array_split(rng.permutation(points), 7)]
+        )
+    )
+    assert np.array_equal(whole, pieces)
+    cells = {}
+    for x, y, z in points:
+        cell = (np.floor(x) + 0.5, np.floor(y) + 0.5)
+        cells[cell] = min(z, cells.get(cell, np.inf))
+    assert {(x, y) for x, y, _ in whole} == set(cells)
+    assert all(abs(cells[x, y] - z) < 1e-4 for x, y, z in whole)

@@ -80,33 +80,27 @@ def test_a_command_shows_that_it_works_before_it_imports_what_computes(name):
 
 @pytest.mark.parametrize("name", ["reconstruct", "update", "enrich", "build"])
 def test_a_long_command_explains_few_options_and_has_a_line_a_group_of_the_others(name):
-    brief = invoke(name, "--help", env={"COLUMNS": "200"}).output
-    every = list_options(invoke(name, "--help-all", env={"COLUMNS": "200"}).output)
-    first = {"--" + option.replace("_", "-") for option in COMMANDS[name]["first"]}
-    assert len(first - {"--help-all"}) <= 10
-    assert set(re.findall(r"^  (--[\w-]+)", brief, re.MULTILINE)) - {"--help"} == first
-    options = {
-        param.opts[0] for param in COMMAND_LINE[name].params if param.opts[0].startswith("--")
-    }
-    assert options <= every
-    lines = brief.partition("explained by --help-all:\n")[2].partition("\n\n")[0].splitlines()
-    left = [
-        param for param in COMMAND_LINE[name].params if param.name not in COMMANDS[name]["first"]
-    ]
-    headings = {getattr(param, "heading", "") for param in left}
+    parameters, first = COMMAND_LINE[name].params, COMMANDS[name]["first"]
+    brief, every = (
+        invoke(name, flag, env={"COLUMNS": "200"}).output for flag in ("--help", "--help-all")
+    )
+    options = {"--" + option.replace("_", "-") for option in first}
+    assert len(options - {"--help-all"}) <= 10
+    assert set(re.findall(r"^  (--[\w-]+)", brief, re.MULTILINE)) - {"--help"} == options
+    names = {param.opts[0] for param in parameters if param.opts[0].startswith("--")}
+    assert names <= list_options(every)
+    text = brief.partition("explained by --help-all:\n")[2].partition("\n\n")[0]
+    headings = {getattr(param, "heading", "") for param in parameters if param.name not in first}
     subjects = {h.removeprefix("Settings: ") for h in headings if h.startswith("Settings: ")}
     more = {COMMANDS[name]["more"]} if "more" in COMMANDS[name] else set()
-    assert {line.strip() for line in lines} == subjects | more
-    assert max(map(len, lines)) <= 80
+    assert {line.strip() for line in text.splitlines()} == subjects | more
+    assert max(map(len, text.splitlines())) <= 80
 
 
 def test_a_shell_completes_commands_and_options():
     def complete(words):
-        environment = {
-            "_HIPROOF_COMPLETE": "bash_complete",
-            "COMP_WORDS": words,
-            "COMP_CWORD": str(words.count(" ")),
-        }
+        environment = {"_HIPROOF_COMPLETE": "bash_complete", "COMP_WORDS": words}
+        environment["COMP_CWORD"] = str(words.count(" "))
         return invoke(env=environment).output.split()
 
     assert sorted(complete("hiproof rep")) == ["plain,report", "plain,repro"]
@@ -188,12 +182,11 @@ def test_a_command_that_ends_at_once_shows_no_progress(capsys):
 def test_check_and_evaluate_print_json(tmp_path):
     """A gable and a block with a courtyard, measured on points drawn from themselves."""
     write_sample_run(tmp_path)
-    np.savetxt(tmp_path / "points.xyz", sample_points())
+    points = str(tmp_path / "points.xyz")
+    np.savetxt(points, sample_points())
     checked = json.loads(invoke("check", str(tmp_path / "buildings.city.jsonl"), "--json").stdout)
     assert checked["valid"]
     assert [(file["solids"], file["invalid"]) for file in checked["files"]] == [(2, 0)]
-    figures = json.loads(
-        invoke("evaluate", str(tmp_path), str(tmp_path / "points.xyz"), "--json").stdout
-    )
-    assert {kind: row["buildings"] for kind, row in figures.items()}["gable"] == 1
+    figures = json.loads(invoke("evaluate", str(tmp_path), points, "--json").stdout)
+    assert figures["gable"]["buildings"] == 1
     assert figures["all"]["share_within_20cm"]["median"] > 0.99

@@ -1,15 +1,23 @@
-"""How many processes a run takes where nobody says."""
+"""How many processes a run takes where nobody says, and what each leaves to the system."""
 
+import ast
+import gc
 import os
+import weakref
+from pathlib import Path
 
 import pytest
 
+import hiproof
 from hiproof.city import run
 from hiproof.city.request import Request
-from hiproof.city.work import cores
+from hiproof.city.work import cores, processes
 from hiproof.city.work.cores import BUILDINGS_A_PROCESS, as_many_as_pay, limit_threads
 from hiproof.city.work.executors import InProcess
 from hiproof.city.work.processes import Processes
+from hiproof.garbage import RARELY, collect_rarely, leave_garbage
+from hiproof.write.files import atomic_file
+from programs import run_python
 
 
 @pytest.mark.parametrize(
@@ -82,3 +90,98 @@ def test_a_run_takes_as_many_as_pay_for_what_is_left(tmp_path, town_files, monke
     (buildings, tiles, footprints), repeat = requests
     assert buildings == summary.buildings and tiles > 0 and footprints and repeat == (0, 0, True)
     assert type(counts[1]) is kind
+
+
+def test_garbage_is_collected_rarely_inside_and_as_before_afterwards():
+    before = gc.get_threshold()
+    with pytest.raises(ZeroDivisionError), collect_rarely():
+        assert gc.get_threshold() == (RARELY, *before[1:])
+        1 / 0  # noqa: B018
+    assert gc.get_threshold() == before
+
+
+def test_objects_that_refer_to_each_other_are_still_freed():
+    """So memory stays flat in runs of any length."""
+
+    class Ring:
+        count = 0
+
+        def __init__(self):
+            self.ring = self
+            Ring.count += 1
+
+        def __del__(self):
+            Ring.count -= 1
+
+    with collect_rarely():
+        for _ in range(3 * RARELY):
+            Ring()
+        assert Ring.count <= 2 * RARELY
+
+
+def test_no_garbage_is_collected_once_a_command_has_ended():
+    class Loop:
+        pass
+
+    loop = Loop()
+    loop.loop = loop
+    kept = weakref.ref(loop)
+    leave_garbage()
+    del loop
+    gc.collect()
+    assert kept() is not None
+
+
+PACKAGE = Path(hiproof.__file__).parent
+NOT_ON_WINDOWS = {"fcntl", "resource", "pwd", "grp", "termios", "posix", "pty"}
+WITHOUT_POSIX = """
+import errno, os, pkgutil, importlib, signal
+del errno.EDQUOT, os.sched_getaffinity, os.fork, signal.SIGKILL
+import hiproof
+from hiproof.city import run
+from hiproof.city.work import cores
+from hiproof.city.work import executors
+from hiproof.city.folder import marks
+from hiproof.city.work import warm
+from hiproof.write import files
+print(cores.cores() > 0)
+"""
+
+
+def test_no_module_is_imported_that_windows_lacks():
+    modules = {
+        name.split(".")[0]
+        for file in PACKAGE.rglob("*.py")
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))
+        for name in (
+            [a.name for a in node.names]
+            if isinstance(node, ast.Import)
+            else [getattr(node, "module", "") or ""]
+        )
+        if isinstance(node, (ast.Import, ast.ImportFrom))
+    }
+    assert modules & NOT_ON_WINDOWS == set() and "numpy" in modules
+
+
+def test_names_that_windows_lacks_are_not_needed():
+    assert run_python(WITHOUT_POSIX).strip() == "True"
+
+
+def test_files_are_synced_through_descriptors_that_may_write(tmp_path, monkeypatch):
+    """Windows refuses the others."""
+    fcntl = pytest.importorskip("fcntl", reason="Windows itself tells nothing of a descriptor")
+    descriptors = []
+
+    def fsync(descriptor):
+        if not os.path.isdir(f"/proc/self/fd/{descriptor}"):
+            descriptors.append(fcntl.fcntl(descriptor, fcntl.F_GETFL) & os.O_ACCMODE)
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    with atomic_file(tmp_path / "a.txt") as file:
+        file.write(b"whole")
+    assert descriptors and all(mode != os.O_RDONLY for mode in descriptors)
+
+
+def test_no_more_processes_are_started_than_windows_can_wait_for(monkeypatch):
+    monkeypatch.setattr(processes.sys, "platform", "win32")
+    assert processes.Processes(100).count == 61 and processes.Processes(4).count == 4

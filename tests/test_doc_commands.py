@@ -29,7 +29,7 @@ NOT_RUN = {
     "hiproof edit": "serves until Ctrl-C",
     "hiproof demo": "models all 26 houses; tests/test_run.py does",
     "hiproof warm": "compiles for minutes",
-    "hiproof repro": "needs a building that failed; tests/test_city_bundles.py has one",
+    "hiproof repro": "needs a building that failed; tests/test_city_failures.py has one",
     "--footprints overture": "needs a network; tests/test_overture.py serves a release",
     "hiproof footprints": "needs a network; tests/test_overture.py serves a release",
     "--scheduler": "needs a Dask cluster; tests/test_city_dask.py starts one",

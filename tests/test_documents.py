@@ -17,7 +17,6 @@ DOCUMENTS = [
 DOCUMENTS += sorted((ROOT / "docs").rglob("*.md"))
 # by docs/generated.py and docs/demo_in_3d.py, when the site is built
 MADE = ("commands.md", "settings.md", "constants.md", "demo/index.html")
-COLUMNS = 100  # of a line, but in tables and in the list that `hiproof attributes` prints
 COMMANDS = app.commands
 OPTIONS = {
     name
@@ -55,9 +54,7 @@ def list_commands(path):
 
 @cache
 def read_sources():
-    """All text of the package, its benchmarks and tests, where names of files and values
-    come from.
-    """
+    """All text of the package, its benchmarks and tests, where names of files and values stand."""
     folders = ("src", "benchmarks", "experiments", "tests", "examples")
     files = [file for folder in folders for file in sorted((ROOT / folder).rglob("*.py"))]
     files += sorted((ROOT / "src" / "hiproof" / "data").glob("*.toml"))
@@ -66,30 +63,14 @@ def read_sources():
 
 def find_module_file(name):
     """The file of a module that `python -m` may be given, None where there is none."""
-    path = ROOT / name.replace(".", "/")
-    files = (
-        path.with_suffix(".py"),
-        path / "__main__.py",
-        ROOT / "src" / name.replace(".", "/") / "__main__.py",
-    )
+    path = name.replace(".", "/")
+    files = (ROOT / f"{path}.py", ROOT / path / "__main__.py", ROOT / "src" / path / "__main__.py")
     return next((file for file in files if file.is_file()), None)
 
 
 def is_path(span):
-    return bool(
-        re.fullmatch(
-            r"[\w.-]*(/[\w.-]+)*(/|\.(py|md|toml|json|jsonl|gml|gpkg|parquet|csv|html))", span
-        )
-    )
-
-
-@pytest.mark.parametrize(
-    "path", [*DOCUMENTS, *(ROOT / "benchmarks").glob("*.md")], ids=lambda path: path.name
-)
-def test_lines_fit(path):
-    outside = [line for line in path.read_text().splitlines() if not line.startswith("|")]
-    long = [line for line in outside if len(line) > COLUMNS and " " in line.strip()]
-    assert path.name == "attributes.md" or long == []
+    endings = r"\.(py|md|toml|json|jsonl|gml|gpkg|parquet|csv|html)"
+    return bool(re.fullmatch(rf"[\w.-]*(/[\w.-]+)*(/|{endings})", span))
 
 
 @every_document
@@ -102,17 +83,14 @@ def test_links_lead_somewhere(path):
 @every_document
 def test_paths_exist(path):
     """Of the repository, or of a run's output, whose names stand in the source."""
-    missing = [
-        span
-        for span in list_spans(path)
-        if is_path(span)
-        and not any((place / span).exists() for place in PLACES)
-        and not (
-            re.search(rf"[\"'/]{re.escape(Path(span).name)}[\"'/]", read_sources())
-            and not span.endswith(".py")
-        )
-    ]
-    assert missing == []
+
+    def is_named(span):
+        name = re.escape(Path(span).name)
+        return not span.endswith(".py") and re.search(rf"[\"'/]{name}[\"'/]", read_sources())
+
+    paths = [span for span in list_spans(path) if is_path(span)]
+    missing = [span for span in paths if not any((place / span).exists() for place in PLACES)]
+    assert [span for span in missing if not is_named(span)] == []
 
 
 @every_document

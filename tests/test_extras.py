@@ -116,19 +116,12 @@ def test_one_primitive_by_the_points_alone_is_said_to_do_without(
     options, hide_package, town_files, tmp_path, capsys
 ):
     hide_package("onnxruntime")
-    arguments = [
-        "reconstruct",
-        town_files[0],
-        "--footprints",
-        town_files[1],
-        "--out",
-        tmp_path,
-        *options,
-    ]
-    assert run_hiproof(*arguments) == 2
+    cloud, footprints = town_files
+    given = ["reconstruct", cloud, "--footprints", footprints, "--out", tmp_path, *options]
+    assert run_hiproof(*given) == 2
     assert capsys.readouterr().err.endswith("or --network never to go by the points alone\n")
     if options == ["--parts", "one"]:
-        assert run_hiproof(*arguments, "--network", "never") == 0
+        assert run_hiproof(*given, "--network", "never") == 0
 
 
 def test_points_by_address_are_refused_before_anything_is_written(hide_package, tmp_path):
@@ -149,24 +142,24 @@ def test_footprints_by_address_name_the_extra_of_their_format(source, hide_packa
 
 def test_labelling_is_refused_before_it_reads_or_writes(hide_package, tmp_path, capsys):
     hide_package("onnxruntime")
-    assert (
-        run_hiproof("segment", tmp_path / "missing.laz", "--out", tmp_path / "out" / "labelled.laz")
-        == 2
-    )
+    places = (tmp_path / "missing.laz", "--out", tmp_path / "out" / "labelled.laz")
+    assert run_hiproof("segment", *places) == 2
     (line,) = capsys.readouterr().err.splitlines()
-    assert re.match(make_pattern("onnxruntime"), line.removeprefix("hiproof: ")) and line.endswith(
-        "'hiproof[network]'"
-    )
-    assert list(tmp_path.iterdir()) == []
+    assert re.match(make_pattern("onnxruntime"), line.removeprefix("hiproof: "))
+    assert line.endswith("'hiproof[network]'") and list(tmp_path.iterdir()) == []
 
 
 def test_a_neighbourhood_is_refused_before_it_is_written(hide_package, tmp_path):
     hide_package("rasterio")
     result = CliRunner().invoke(simulate, ["neighbourhood", str(tmp_path / "town")])
-    assert result.exit_code == 2 and re.match(
-        make_pattern("rasterio"), result.output.removeprefix("error: ")
-    )
+    assert result.exit_code == 2
+    assert re.match(make_pattern("rasterio"), result.output.removeprefix("error: "))
     assert not (tmp_path / "town").exists()
+
+
+def reconstruct_with(**settings):
+    settings = Settings.from_dict(settings)
+    return lambda: hiproof.reconstruct(gable_points(), FOOTPRINT, settings=settings)
 
 
 @pytest.mark.parametrize(
@@ -176,19 +169,9 @@ def test_a_neighbourhood_is_refused_before_it_is_written(hide_package, tmp_path)
         ("onnxruntime", lambda: segment(gable_points())),
         ("onnxruntime", lambda: segment_files([], Path("labelled.laz"), Settings())),
         ("matplotlib", lambda: hiproof.plot(hiproof.reconstruct(gable_points(), FOOTPRINT))),
-        *(
-            (
-                "onnxruntime",
-                lambda arguments=arguments: hiproof.reconstruct(
-                    gable_points(), FOOTPRINT, settings=Settings.from_dict(arguments)
-                ),
-            )
-            for arguments in (
-                {"fit": {"parts": "one"}},
-                {"fit": {"objective": "paper"}},
-                {"segment": {"network": "always"}},
-            )
-        ),
+        ("onnxruntime", reconstruct_with(fit={"parts": "one"})),
+        ("onnxruntime", reconstruct_with(fit={"objective": "paper"})),
+        ("onnxruntime", reconstruct_with(segment={"network": "always"})),
     ],
 )
 def test_python_gets_the_same_sentence(package, call, hide_package):
@@ -199,9 +182,8 @@ def test_python_gets_the_same_sentence(package, call, hide_package):
 
 def test_training_names_its_extra(hide_package):
     hide_package("torch")
-    with pytest.raises(
-        InputError, match=r"expected the package torch for training, got: .+'hiproof\[train\]'$"
-    ):
+    sentence = r"expected the package torch for training, got: .+'hiproof\[train\]'$"
+    with pytest.raises(InputError, match=sentence):
         hiproof.learn.train  # noqa: B018
 
 
@@ -223,12 +205,10 @@ def test_a_roof_is_the_same_without_what_it_does_not_ask_for(arguments, hide_pac
 def test_the_page_says_at_once_that_a_terrain_model_cannot_be_read(
     hide_package, town_files, tmp_path
 ):
-    files = demo_files()
-    inside = shapely.box(91990, 450990, 92015, 451015).bounds
-    out, inputs = tmp_path / "out", (str(files["cloud"]),)
-    reconstruct_area(
-        Request(inputs, out, str(files["footprints"]), str(files["terrain"]), bbox=inside)
-    )
+    files = {name: str(path) for name, path in demo_files().items()}
+    inside, out = (91990, 450990, 92015, 451015), tmp_path / "out"
+    inputs = (files["footprints"], files["terrain"])
+    reconstruct_area(Request((files["cloud"],), out, *inputs, bbox=inside))
     assert RunPoints(out).missing == ""
     hide_package("rasterio")
     assert "all but refitting works (expected the package rasterio" in RunPoints(out).missing
@@ -259,9 +239,8 @@ def list_names(requirements):
     """The packages that requirements name: `laspy` of "laspy[lazrs]>=2.5.3"; of dask[distributed]
     what it is there for too.
     """
-    return {
-        name for text in requirements for name in re.findall(r"[a-z]\w+", text.partition(">=")[0])
-    }
+    texts = (text.partition(">=")[0] for text in requirements)
+    return {name for text in texts for name in re.findall(r"[a-z]\w+", text)}
 
 
 def test_each_sentence_names_the_extra_that_brings_the_package():

@@ -102,10 +102,8 @@ def test_the_file_tells_of_every_step_and_of_lost_workers(
     message = "\n".join(f"{level} {text}" for level, text in lines)
     assert "INFO version" in message and "4 buildings in 1 work tile\n" in message
     assert "INFO sort:0 is done" in message and "is done: 4 buildings" in message
-    assert (
-        "WARNING solve:" in message
-        and "was lost (a worker process died) and is tried again" in message
-    )
+    assert "WARNING solve:" in message
+    assert "was lost (a worker process died) and is tried again" in message
     assert (
         sum(level == "DEBUG" and text.startswith("building house-") for level, text in lines) == 4
     )

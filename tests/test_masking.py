@@ -1,6 +1,4 @@
-"""Passwords in addresses stay where they were given: no output, error, warning or log
-repeats them.
-"""
+"""Passwords in addresses stay where they were given: no output, warning or log repeats them."""
 
 import json
 import warnings

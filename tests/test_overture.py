@@ -19,7 +19,7 @@ from hiproof.read.outlines.footprints import read_footprints
 from hiproof.settings import Settings
 from programs import run_hiproof
 from range_server import serve
-from run_records import RECORDS
+from run_records import records
 from tiny_town import CRS, make_town, write_cloud, write_town
 
 pyarrow = pytest.importorskip("pyarrow.parquet", reason="the extra `parquet` is not installed")
@@ -51,22 +51,18 @@ def town_rows():
     """The rows of the town in several row groups: its houses, a cellar below one of them, and
     others far away.
     """
-    houses = list(TOWN.footprints.items())
-    attributes = dict(height=8.5, num_floors=2, roof_shape="gabled", min_height=0.0)
-    nearby = [building(f"gers-{id}", convert_to_degrees(area)) for id, area in houses]
-    nearby[0] |= attributes
+
+    def row(id, area, x=0.0, y=0.0, **more):
+        return building(id, convert_to_degrees(shift(area, x, y)), **more)
+
+    nearby = [row(f"gers-{id}", area) for id, area in TOWN.footprints.items()]
+    nearby[0] |= dict(height=8.5, num_floors=2, roof_shape="gabled", min_height=0.0)
     nearby[1]["sources"] = [OSM, GOOGLE]
-    cellar = building(
-        "gers-cellar", convert_to_degrees(shift(houses[0][1], 2)), is_underground=True
-    )
-    neighbour = building("gers-beside", convert_to_degrees(shift(houses[0][1], 0, 60)))
+    first = TOWN.footprints["house-0"]
+    odd = [row("gers-cellar", first, 2, is_underground=True), row("gers-beside", first, 0, 60)]
     # of so many vertices that a row group is larger than what readers take for a file's end
-    detailed = shapely.segmentize(houses[0][1], 0.02)
-    distant = [
-        building(f"gers-far-{i}", convert_to_degrees(shift(detailed, 3000 + 100 * i)))
-        for i in range(40)
-    ]
-    return nearby, [cellar, neighbour], distant
+    detailed = shapely.segmentize(first, 0.02)
+    return nearby, odd, [row(f"gers-far-{i}", detailed, 3000 + 100 * i) for i in range(40)]
 
 
 def first_byte(metadata, group):
@@ -103,30 +99,23 @@ def test_a_run_takes_the_buildings_of_the_clouds_extent(served_release, tmp_path
     out = tmp_path / "out"
     summary = reconstruct_area(Request((str(cloud),), out, "overture", settings=settings))
     assert summary.buildings == len(TOWN.footprints)
-    footprints = {f.id: f for f in read_footprints(out / ".hiproof/overture.gpkg", target_crs=CRS)}
+    kept = out / ".hiproof" / "overture.gpkg"
+    footprints = {f.id: f for f in read_footprints(kept, target_crs=CRS)}
     assert sorted(footprints) == sorted(f"gers-{id}" for id in TOWN.footprints)
     for id, area in TOWN.footprints.items():
         assert shapely.hausdorff_distance(footprints[f"gers-{id}"].polygon, area) < 1e-3
-    assert footprints["gers-house-0"].attributes == {
-        "id": "gers-house-0",
-        "height": 8.5,
-        "min_height": 0.0,
-        "num_floors": 2,
-        "roof_shape": "gabled",
-    }
+    known = {"height": 8.5, "min_height": 0.0, "num_floors": 2, "roof_shape": "gabled"}
+    assert footprints["gers-house-0"].attributes == known | {"id": "gers-house-0"}
     record = json.loads((out / "run.json").read_text())
+    assert record["inputs"]["footprints"] == str(kept)
     source = record["footprints_source"]
-    assert (source["name"], source["release"], source["licence"], source["type"]) == (
-        "Overture Maps",
-        RELEASE,
-        "ODbL-1.0",
-        "building",
-    )
+    expected = {"name": "Overture Maps", "release": RELEASE, "licence": "ODbL-1.0"}
+    expected |= {"type": "building"}
+    assert {name: source[name] for name in expected} == expected
     assert source["sources"] == [
         {"dataset": "Google Open Buildings", "licence": "CC-BY-4.0", "footprints": 1},
         {"dataset": "OpenStreetMap", "licence": "ODbL-1.0", "footprints": 4},
     ]
-    assert record["inputs"]["footprints"] == str(out / ".hiproof" / "overture.gpkg")
 
 
 def test_a_finished_run_asks_for_no_network(served_release, tmp_path):
@@ -159,24 +148,15 @@ def test_a_kept_file_gives_the_same_models(served_release, tmp_path, capsys):
     assert run_hiproof("footprints", cloud, "--out", other, "--config", config) == 2
     assert "expected --out to name a GeoPackage" in capsys.readouterr().err
     assert f"{stored}: 4 footprints of Overture Maps {RELEASE} (ODbL-1.0" in output
-    _, _, _, columns = pyogrio.raw.read(
-        stored, columns=["id", "height", "num_floors", "roof_shape"]
-    )
-    first = [column[0] for column in columns]
-    assert first == ["gers-house-0", 8.5, 2, "gabled"]
-    for name, footprints in (("direct", "overture"), ("kept", str(stored))):
-        request = Request((str(cloud),), tmp_path / name, footprints, settings=settings)
-        reconstruct_area(request)
-    for name in RECORDS:
-        direct, from_file = (
-            (tmp_path / folder / name).read_bytes() for folder in ("direct", "kept")
-        )
-        assert direct == from_file
-    notes = [
-        json.loads((tmp_path / folder / "run.json").read_text())["footprints_source"]
-        for folder in ("direct", "kept")
-    ]
-    assert notes[0] == notes[1]
+    names = ["id", "height", "num_floors", "roof_shape"]
+    _, _, _, columns = pyogrio.raw.read(stored, columns=names)
+    assert [column[0] for column in columns] == ["gers-house-0", 8.5, 2, "gabled"]
+    direct, kept = tmp_path / "direct", tmp_path / "kept"
+    for out, footprints in ((direct, "overture"), (kept, str(stored))):
+        reconstruct_area(Request((str(cloud),), out, footprints, settings=settings))
+    assert records(direct) == records(kept)
+    notes = [json.loads((out / "run.json").read_text()) for out in (direct, kept)]
+    assert notes[0]["footprints_source"] == notes[1]["footprints_source"]
 
 
 def test_only_the_row_groups_that_meet_the_extent_are_fetched(served_release, tmp_path):

@@ -25,6 +25,14 @@ OURS = [path.relative_to(ROOT / "src").as_posix() for path in PACKAGE.rglob("*")
 OURS = {name for name in OURS if "__pycache__" not in name}
 
 
+def build(kind, folder, source):
+    """Build an archive or a wheel of `source` into a folder; return its path."""
+    options = ("-t", kind, "-d", folder)
+    run(sys.executable, "-m", "hatchling", "build", *options, cwd=source)
+    (path,) = folder.glob("*.tar.gz" if kind == "sdist" else "*.whl")
+    return path
+
+
 def run(*command, **options):
     process = subprocess.run(
         list(map(str, command)), capture_output=True, text=True, check=False, **options
@@ -49,23 +57,10 @@ def archive_and_wheel(tmp_path_factory):
         "hatchling", reason="building needs hatchling, which the extra `test` brings"
     )
     folder = tmp_path_factory.mktemp("built")
-    run(sys.executable, "-m", "hatchling", "build", "-t", "sdist", "-d", folder, cwd=ROOT)
-    (archive,) = folder.glob("*.tar.gz")
+    archive = build("sdist", folder, ROOT)
     with tarfile.open(archive) as tar:
         tar.extractall(folder, filter="data")
-    run(
-        sys.executable,
-        "-m",
-        "hatchling",
-        "build",
-        "-t",
-        "wheel",
-        "-d",
-        folder,
-        cwd=folder / archive.name[: -len(".tar.gz")],
-    )
-    (wheel,) = folder.glob("*.whl")
-    return archive, wheel
+    return archive, build("wheel", folder, folder / archive.name.removesuffix(".tar.gz"))
 
 
 @pytest.fixture(scope="module")
@@ -76,25 +71,12 @@ def installed_python(archive_and_wheel, tmp_path_factory):
     home = tmp_path_factory.mktemp("clean")
     venv.create(home, with_pip=False)
     python = home / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
-    run(
-        sys.executable,
-        "-m",
-        "pip",
-        "--python",
-        python,
-        "install",
-        "--quiet",
-        "--no-deps",
-        "--no-index",
-        archive_and_wheel[1],
-    )
+    pip = (sys.executable, "-m", "pip", "--python", python, "install", "--quiet")
+    run(*pip, "--no-deps", "--no-index", archive_and_wheel[1])
     (site,) = [path for path in home.rglob("site-packages") if (path / "hiproof").is_dir()]
-    dependencies = [
-        path
-        for path in dict.fromkeys([sysconfig.get_path("purelib"), *sys.path])
-        if "site-packages" in path
-    ]
-    (site / "dependencies.pth").write_text("\n".join(dependencies), encoding="utf-8")
+    places = dict.fromkeys([sysconfig.get_path("purelib"), *sys.path])
+    dependencies = "\n".join(path for path in places if "site-packages" in path)
+    (site / "dependencies.pth").write_text(dependencies, encoding="utf-8")
     # compiled code belongs to its sources, and these are the same
     for file in PACKAGE.rglob("*.nbc"):
         place = site / "hiproof" / file.relative_to(PACKAGE)
@@ -119,9 +101,7 @@ def test_the_archive_is_small_and_holds_what_builds_and_tests_it(archive_and_whe
 
 
 def test_the_installed_wheel_is_imported_and_models_the_demo(installed_python, tmp_path):
-    environment = {
-        name: value for name, value in os.environ.items() if not name.startswith("PYTHON")
-    }
+    environment = {name: v for name, v in os.environ.items() if not name.startswith("PYTHON")}
     code = "import hiproof; print(hiproof.__file__); print(hiproof.__version__)"
     place, version = run(installed_python, "-c", code, cwd=tmp_path, env=environment).split()
     assert Path(place).is_relative_to(installed_python.parents[1])
@@ -132,11 +112,8 @@ def test_the_installed_wheel_is_imported_and_models_the_demo(installed_python, t
 
 
 def test_a_citation_names_the_version_that_is_there():
-    import hiproof
-
-    assert f"version: {hiproof.__version__}\n" in (ROOT / "CITATION.cff").read_text(
-        encoding="utf-8"
-    )
+    text = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"version: {hiproof.__version__}\n" in text
 
 
 def test_the_conda_recipe_asks_for_what_the_project_depends_on():

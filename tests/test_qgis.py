@@ -23,17 +23,17 @@ QGIS = shutil.which("qgis_process.bin") or shutil.which("qgis_process")
 @pytest.fixture
 def plugin(monkeypatch):
     """The modules of the plugin that need no QGIS."""
+
+    def list_own():
+        return {name for name in sys.modules if name.split(".")[0] == "hiproof"}
+
     monkeypatch.syspath_prepend(str(PLUGINS))
-    modules = {
-        name: module for name, module in sys.modules.items() if name.split(".")[0] == "hiproof"
-    }
-    for name in modules:
-        del sys.modules[name]
+    modules = {name: sys.modules.pop(name) for name in list_own()}
     # the plugin's folder has the package's name, as QGIS shows it
     from hiproof import commands, process
 
     yield commands, process
-    for name in [name for name in sys.modules if name.split(".")[0] == "hiproof"]:
+    for name in list_own():
         del sys.modules[name]
     sys.modules.update(modules)
 
@@ -46,34 +46,22 @@ def is_taken(command):
 
 def test_the_commands_are_ones_that_hiproof_takes(plugin, tmp_path):
     commands, _ = plugin
-    everything = commands.reconstruct(
-        "hiproof",
-        ["a.laz", "b.laz"],
-        "out",
-        "f.gpkg",
-        "pand",
-        "year < 1950",
-        (-1.5, 2, 3, 4),
-        "t.tif",
-        "EPSG:7415",
-        4,
-        "--types 'gable,hip'",
-    )
-    is_taken_all = is_taken(everything)
-    assert (
-        is_taken_all["clouds"] == ["a.laz", "b.laz"]
-        and is_taken_all["jobs"] == 4
-        and is_taken_all["types"] == "gable,hip"
-    )
-    assert (
-        is_taken_all["bbox"] == "-1.5,2,3,4"
-        and is_taken_all["where"] == "year < 1950"
-        and is_taken_all["layer"] == "pand"
-    )
+    outlines = ("f.gpkg", "pand", "year < 1950", (-1.5, 2, 3, 4))
+    options = ("t.tif", "EPSG:7415", 4, "--types 'gable,hip'")
+    all_of_it = commands.reconstruct("hiproof", ["a.laz", "b.laz"], "out", *outlines, *options)
+    taken = is_taken(all_of_it)
+    expected = {
+        "clouds": ["a.laz", "b.laz"],
+        "jobs": 4,
+        "types": "gable,hip",
+        "bbox": "-1.5,2,3,4",
+        "where": "year < 1950",
+        "layer": "pand",
+    }
+    assert {name: taken[name] for name in expected} == expected
     assert is_taken(commands.reconstruct("hiproof", ["a.laz"], "out"))["footprints"] is None
-    assert (
-        is_taken(commands.evaluate("hiproof", "out", ["a.laz"], "f.gpkg"))["footprints"] == "f.gpkg"
-    )
+    evaluated = is_taken(commands.evaluate("hiproof", "out", ["a.laz"], "f.gpkg"))
+    assert evaluated["footprints"] == "f.gpkg"
     for name, file in commands.FORMATS.items():
         assert is_taken(commands.convert("hiproof", "out", name, file))["format"] == name
         assert choose_format(file) == name and FORMATS[name].file == file
@@ -83,13 +71,12 @@ def test_the_commands_are_ones_that_hiproof_takes(plugin, tmp_path):
 def test_what_a_command_says_is_handed_on_and_its_end_told(plugin):
     _, process = plugin
     lines = []
-    code = (
-        "import sys; print('first'); print('second', file=sys.stderr); sys.exit(int(sys.argv[1]))"
-    )
-    assert process.run([sys.executable, "-c", code, "1"], lines.append, lambda: False) == 1
+    code = "import sys; print('first'); print('second', file=sys.stderr); sys.exit(int("
+    command = [sys.executable, "-c", f"{code}sys.argv[1]))"]
+    assert process.run([*command, "1"], lines.append, lambda: False) == 1
     assert sorted(lines) == ["first", "second"]
     with pytest.raises(process.Failed, match="second"):
-        process.run([sys.executable, "-c", code, "2"], lines.append, lambda: False)
+        process.run([*command, "2"], lines.append, lambda: False)
     with pytest.raises(process.Failed, match=r"expected the program hiproof.*pip install"):
         process.run(["no-such-program"], lines.append, lambda: False)
 
@@ -117,36 +104,22 @@ def test_qgis_runs_it(tmp_path):
     profile = tmp_path / ".local/share/QGIS/QGIS3/profiles/default/QGIS"
     profile.mkdir(parents=True)
     (profile / "QGIS3.ini").write_text("[PythonPlugins]\nhiproof=true\n", encoding="utf-8")
+    out, files = tmp_path / "out", demo_files()
     # QGIS leaves statistics beside what it opens
-    files = {
-        name: shutil.copy(file, tmp_path) for name, file in demo_files().items() if name != "truth"
-    }
-    out = tmp_path / "out"
-    parameters = {
-        "CLOUDS": files["cloud"],
-        "FOOTPRINTS": files["footprints"],
-        "TERRAIN": files["terrain"],
-        "EXTENT": "91990,92034,451000,451018",
-        "OUTPUT": out,
-        "PROGRAM": Path(sys.executable).with_name("hiproof"),
-    }
-    command = [
-        QGIS,
-        "run",
-        "hiproof:reconstruct",
-        "--",
-        *(f"{name}={value}" for name, value in parameters.items()),
-    ]
-    surroundings = {
-        "HOME": str(tmp_path),
-        "QT_QPA_PLATFORM": "offscreen",
-        "QGIS_PLUGINPATH": str(PLUGINS),
-        "XDG_RUNTIME_DIR": str(tmp_path),
-    }
+    names = {"CLOUDS": "cloud", "FOOTPRINTS": "footprints", "TERRAIN": "terrain"}
+    parameters = {name: shutil.copy(files[kind], tmp_path) for name, kind in names.items()}
+    parameters |= {"EXTENT": "91990,92034,451000,451018", "OUTPUT": out}
+    parameters |= {"PROGRAM": Path(sys.executable).with_name("hiproof")}
+    given = [f"{name}={value}" for name, value in parameters.items()]
+    surroundings = {"HOME": tmp_path, "XDG_RUNTIME_DIR": tmp_path, "QGIS_PLUGINPATH": PLUGINS}
+    surroundings = {name: str(path) for name, path in surroundings.items()}
     process = subprocess.run(
-        command, capture_output=True, text=True, env={**os.environ, **surroundings}, check=False
+        [QGIS, "run", "hiproof:reconstruct", "--", *given],
+        capture_output=True,
+        text=True,
+        env={**os.environ, **surroundings, "QT_QPA_PLATFORM": "offscreen"},
+        check=False,
     )
     assert process.returncode == 0, process.stdout + process.stderr
-    assert (out / "buildings.gml").exists() and "buildings" in process.stdout.partition("Results")[
-        2
-    ]
+    results = process.stdout.partition("Results")[2]
+    assert (out / "buildings.gml").exists() and "buildings" in results

@@ -66,16 +66,14 @@ def attributes(out):
 
 def lengths(building):
     """Every length of the parts and heights of a building, in metres."""
-    parts = [value for part in building["parts"] for value in part["parameters"].values()]
-    return np.array(
-        [
-            *parts,
-            *building["parts"][0]["position"],
-            building["z_ground"],
-            *building["residuals"].values(),
-        ],
-        float,
-    )
+    parts, first = building["parts"], building["parts"][0]
+    sizes = [value for part in parts for value in part["parameters"].values()]
+    heights = [*first["position"], building["z_ground"], *building["residuals"].values()]
+    return np.array([*sizes, *heights], float)
+
+
+def read_unit(**read):
+    return {"settings": Settings.from_dict({"read": read})}
 
 
 @pytest.fixture(scope="module")
@@ -97,8 +95,8 @@ def test_there_and_back_is_the_identity(units):
         (FEET, "EPSG:2263+6360", "EPSG:2263", {}),
         (FEET, "EPSG:2263", None, {}),
         (MIXED, "EPSG:2263+5703", "EPSG:2263", {}),
-        (FEET, None, None, {"settings": Settings.from_dict({"read": {"unit": "us-survey-foot"}})}),
-        (FEET, None, None, {"settings": Settings.from_dict({"read": {"crs": "EPSG:2263+6360"}})}),
+        (FEET, None, None, read_unit(unit="us-survey-foot")),
+        (FEET, None, None, read_unit(crs="EPSG:2263+6360")),
         (FEET, None, "EPSG:2263", {}),
     ],
     ids=["compound", "plan only", "heights in metres", "--unit", "--crs", "CRS of the footprints"],
@@ -108,22 +106,18 @@ def test_feet_give_the_same_buildings_as_metres(
     in_metres, tmp_path, units, cloud_crs, plan_crs, options
 ):
     out = run(tmp_path / "feet", units, cloud_crs, plan_crs, **options)
-    for first, metre_record in zip(parameters(out), parameters(in_metres), strict=True):
-        assert (first["id"], first["type"], len(first["parts"])) == (
-            metre_record["id"],
-            metre_record["type"],
-            len(metre_record["parts"]),
-        )
-        assert np.abs(lengths(first) - lengths(metre_record)).max() < 0.005
+    for first, in_m in zip(parameters(out), parameters(in_metres), strict=True):
+        assert [first[key] for key in ("id", "type")] == [in_m[key] for key in ("id", "type")]
+        assert len(first["parts"]) == len(in_m["parts"])
+        assert np.abs(lengths(first) - lengths(in_m)).max() < 0.005
     in_feet, theirs = attributes(out), attributes(in_metres)
     for id, values in in_feet.items():
         for name in ("rf_volume_lod22", "rf_h_ground", "rf_h_roof_max", "rf_pt_density"):
             assert values[name] == pytest.approx(theirs[id][name], rel=2e-3)
         assert "US survey foot" in values["hiproof_units"] and "hiproof_units" not in theirs[id]
     record = json.loads((out / "run.json").read_text())["units"]
-    assert (record["metres_in_plan_unit"], record["metres_in_height_unit"]) == pytest.approx(
-        (units.plan, units.height)
-    )
+    known = (record["metres_in_plan_unit"], record["metres_in_height_unit"])
+    assert known == pytest.approx((units.plan, units.height))
 
 
 def extents(out):
@@ -131,30 +125,21 @@ def extents(out):
     and in the table of roof surfaces.
     """
     header = json.loads((out / "buildings.city.jsonl").read_text().splitlines()[0])
-    corners = [
-        node.text.split()
-        for node in etree.parse(out / "buildings.gml").iter("{*}lowerCorner", "{*}upperCorner")
-    ]
+    root = etree.parse(out / "buildings.gml")
+    corners = [node.text.split() for node in root.iter("{*}lowerCorner", "{*}upperCorner")]
     _, _, roofs, _ = pyogrio.raw.read(out / "buildings.gpkg", layer="roof_surfaces")
     places = shapely.get_coordinates(shapely.from_wkb(roofs), include_z=True)
-    return (
-        np.reshape(header["metadata"]["geographicalExtent"], (2, 3)),
-        np.array(corners, float),
-        np.array([places.min(axis=0), places.max(axis=0)]),
-    )
+    box = np.reshape(header["metadata"]["geographicalExtent"], (2, 3))
+    return box, np.array(corners, float), np.array([places.min(axis=0), places.max(axis=0)])
 
 
 def test_coordinates_are_written_in_the_unit_of_the_crs_that_the_file_names(in_metres, tmp_path):
     """A compound without a code of its own is named by its plan alone in CityJSON, any in tables:
     heights are then in the plan's unit.
     """
-    json_m, gml_m, table_m = extents(in_metres)
-    json_ft, gml_ft, table_ft = extents(
-        run(tmp_path / "feet", MIXED, "EPSG:2263+5703", "EPSG:2263")
-    )
-    assert np.allclose(FEET.to_metres(json_ft), json_m, atol=0.02)
-    assert np.allclose(MIXED.to_metres(gml_ft), gml_m, atol=0.02)
-    assert np.allclose(FEET.to_metres(table_ft), table_m, atol=0.02)
+    in_feet = extents(run(tmp_path / "feet", MIXED, "EPSG:2263+5703", "EPSG:2263"))
+    for units, ours, theirs in zip((FEET, MIXED, FEET), in_feet, extents(in_metres), strict=True):
+        assert np.allclose(units.to_metres(ours), theirs, atol=0.02)
 
 
 def areas_to_load(out):
@@ -167,12 +152,10 @@ def areas_to_load(out):
 def test_solids_in_feet_are_read_back_in_metres(in_metres, tmp_path):
     out = run(tmp_path / "feet", FEET, "EPSG:2263+6360", "EPSG:2263")
     for name in ("buildings.gml", "buildings.city.jsonl"):
-        for (_, solid), (_, theirs) in zip(
-            read_solids(out / name), read_solids(in_metres / name), strict=True
-        ):
-            assert np.allclose(
-                np.ptp(solid.vertices, axis=0), np.ptp(theirs.vertices, axis=0), atol=0.02
-            )
+        solids = read_solids(out / name), read_solids(in_metres / name)
+        for (_, solid), (_, theirs) in zip(*solids, strict=True):
+            sizes = (np.ptp(one.vertices, axis=0) for one in (solid, theirs))
+            assert np.allclose(*sizes, atol=0.02)
     assert areas_to_load(out) == pytest.approx(areas_to_load(in_metres), rel=2e-3)
     cloud, footprints = tmp_path / "feet/cloud.laz", tmp_path / "feet/footprints.gpkg"
     for figures in evaluate_run(out, [str(cloud)], str(footprints)).figures:
@@ -181,21 +164,25 @@ def test_solids_in_feet_are_read_back_in_metres(in_metres, tmp_path):
 
 def test_clouds_of_another_crs_than_the_run_are_not_measured_against(in_metres, tmp_path):
     cloud = write_cloud(tmp_path / "feet.laz", TOWN.xyz, TOWN.classification, "EPSG:2263")
-    with pytest.raises(
-        InputError, match=r"EPSG:7415 .* in the run and EPSG:2263 .* in .*feet\.laz"
-    ):
+    sentence = r"EPSG:7415 .* in the run and EPSG:2263 .* in .*feet\.laz"
+    with pytest.raises(InputError, match=sentence):
         evaluate_run(in_metres, [str(cloud)])
 
 
 def test_a_unit_without_a_crs_is_known_again_by_evaluate(tmp_path):
-    settings = Settings.from_dict({"read": {"unit": "us-survey-foot"}})
+    cloud, footprints = (str(tmp_path / "feet" / n) for n in ("cloud.laz", "footprints.gpkg"))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        out = run(tmp_path / "feet", FEET, None, None, settings=settings)
-        run_again = evaluate_run(
-            out, [str(tmp_path / "feet/cloud.laz")], str(tmp_path / "feet/footprints.gpkg")
-        )
+        out = run(tmp_path / "feet", FEET, None, None, **read_unit(unit="us-survey-foot"))
+        run_again = evaluate_run(out, [cloud], footprints)
     assert all(figures.quality.share_within_20cm > 0.95 for figures in run_again.figures)
+
+
+def count_sorted(out):
+    """How many points a run sorted."""
+    tasks = Ledger(out / ".hiproof/ledger.sqlite").tasks()
+    (sort,) = [task for task in tasks if task.kind == "sort"]
+    return json.loads(sort.message)["points"]
 
 
 def test_points_and_footprints_are_read_in_metres_and_say_what_they_were(tmp_path):
@@ -236,34 +223,22 @@ def test_an_index_in_feet_is_asked_in_feet(tmp_path, monkeypatch, quick_tiles):
     monkeypatch.setattr("hiproof.city.work.sort.QUERY_M", 25.0)
     monkeypatch.setattr("hiproof.read.points.runs.RUN_POINTS", 50)
     along = np.argsort(TOWN.xyz[:, 0].round(-1), kind="stable")
-    xyz = FEET.from_metres(TOWN.xyz[along])
+    xyz, origin = FEET.from_metres(TOWN.xyz[along]), FEET.from_metres(ORIGIN)
     classes = TOWN.classification[along]
-    origin = FEET.from_metres(ORIGIN)
     single = {"house-0": shapely.transform(TOWN.footprints["house-0"], FEET.from_metres)}
     footprints = str(write_footprints(tmp_path / "alone.gpkg", single, "EPSG:2263"))
-    clouds = [
-        write_cloud(tmp_path / "plain.laz", xyz, classes, None, origin),
-        write_cloud(tmp_path / "indexed.laz", xyz, classes, None, origin),
-        write_copc(tmp_path / "cloud.copc.laz", xyz, classes),
-    ]
+    plain, indexed = (tmp_path / name for name in ("plain.laz", "indexed.laz"))
+    for path in (plain, indexed):
+        write_cloud(path, xyz, classes, None, origin)
     write_lax(tmp_path / "indexed.lax", xyz)
-    settings, result = Settings.from_dict({"read": {"crs": "EPSG:2263"}}), []
-    for number, cloud in enumerate(clouds):
+    copc, rows, counts = write_copc(tmp_path / "cloud.copc.laz", xyz, classes), [], []
+    for number, cloud in enumerate((plain, indexed, copc)):
         out = tmp_path / str(number)
-        reconstruct_area(Request((str(cloud),), out, footprints, settings=settings))
-        result.append(
-            (
-                parameters(out),
-                [
-                    json.loads(task.message)["points"]
-                    for task in Ledger(out / ".hiproof/ledger.sqlite").tasks()
-                    if task.kind == "sort"
-                ],
-            )
-        )
-    (plain, (all_points,)), (indexed, (some_points,)), (copc, (of_copc,)) = result
-    assert plain[0]["points"] == indexed[0]["points"] == copc[0]["points"] > 100
-    assert plain == indexed and some_points < all_points and of_copc < all_points
+        reconstruct_area(Request((str(cloud),), out, footprints, **read_unit(crs="EPSG:2263")))
+        rows.append(parameters(out))
+        counts.append(count_sorted(out))
+    assert rows[0] == rows[1] and rows[0][0]["points"] == rows[2][0]["points"] > 100
+    assert max(counts[1:]) < counts[0]
 
 
 @pytest.mark.parametrize(
@@ -297,26 +272,18 @@ def test_a_unit_that_is_not_the_crs_is_refused(tmp_path):
 
 
 def test_units_have_names():
-    assert (
-        str(METRES) == "metre"
-        and str(Units(0.3048, 1.0, "foot", "metre")) == "foot, heights in metre"
-    )
+    assert str(METRES) == "metre"
+    assert str(Units(0.3048, 1.0, "foot", "metre")) == "foot, heights in metre"
 
 
 def test_a_run_says_that_a_clouds_heights_come_in_coarse_steps(tmp_path):
-    xyz = np.column_stack([TOWN.xyz[:, :2], np.rint(TOWN.xyz[:, 2] * 10) / 10])
-    np.savetxt(
-        tmp_path / "cloud.xyzc",
-        np.column_stack([xyz, TOWN.classification]),
-        "%.3f",
-        header="x y z classification",
-    )
+    path, z = tmp_path / "cloud.xyzc", np.rint(TOWN.xyz[:, 2] * 10) / 10
+    rows = np.column_stack([TOWN.xyz[:, :2], z, TOWN.classification])
+    np.savetxt(path, rows, "%.3f", header="x y z classification")
     footprints = write_footprints(tmp_path / "footprints.gpkg", TOWN.footprints)
-    request = Request((str(tmp_path / "cloud.xyzc"),), tmp_path / "out", str(footprints))
-    with pytest.warns(
-        InputWarning, match=r"cloud\.xyzc: coordinates come in steps of 0\.1 m in height, and roofs"
-    ):
-        make_plan(request)
+    remark = r"cloud\.xyzc: coordinates come in steps of 0\.1 m in height, and roofs"
+    with pytest.warns(InputWarning, match=remark):
+        make_plan(Request((str(path),), tmp_path / "out", str(footprints)))
 
 
 @pytest.mark.parametrize("up", [0.0, 43.0])

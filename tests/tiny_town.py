@@ -1,6 +1,5 @@
-"""A town of a few houses as files: a LAZ cloud with ground, GeoJSON footprints, their truth.
-
-Small enough for any test.
+"""A town of a few houses as files: a LAZ cloud with ground, GeoJSON footprints, their truth. Small
+enough for any test.
 """
 
 from dataclasses import dataclass

@@ -112,10 +112,9 @@ def draw_scene(rng, volumes=None, count=250, types=()):
 
 
 def draw_member(rng, shape, regular=False, skewed=False):
-    """Draw a member of the family called `shape` (or a kin of it).
-
-    Its ridge is along its own u. A `regular` one has one eave and one slope, as most roofs have.
-    The planes of a `skewed` one face a little off the axes.
+    """Draw a member of the family called `shape` (or a kin of it). Its ridge is along its own u. A
+    `regular` one has one eave and one slope, as most roofs have. The planes of a `skewed` one face
+    a little off the axes.
     """
     top, sides = next(
         (has_top, sides)

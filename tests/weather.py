@@ -30,9 +30,8 @@ def simulate_weather(latitude=52.0, longitude=4.36, zone=1):
 def write_epw(
     path, latitude=52.0, longitude=4.36, zone=1, said_zone=None, change=lambda columns: None
 ):
-    """Write weather of a year as EPW.
-
-    Its head may name another zone, and `change` may spoil its columns: irradiance, and stamps.
+    """Write weather of a year as EPW. Its head may name another zone, and `change` may spoil its
+    columns: irradiance, and stamps.
     """
     times, values = simulate_weather(latitude, longitude, zone)
     stamps = [f"2023,{time.month},{time.day},{time.hour + 1},60,?9" for time in times]

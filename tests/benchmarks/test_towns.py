@@ -2,13 +2,31 @@
 grounds apart are buildings.
 """
 
+import dataclasses
+import importlib
 from pathlib import Path
+from pkgutil import resolve_name
 
 import numpy as np
 import pytest
 import shapely
+from benchmarks.budget import STAGES, Clock, refuse_incomplete
+from benchmarks.compounds import compare_parts
 from benchmarks.delft import select_footprints
-from benchmarks.judging import SHARED
+from benchmarks.judging import (
+    SHARED,
+    make_raster,
+    measure_named_share,
+    measure_visible_areas,
+    sum_area_by_type,
+)
+from benchmarks.matching import (
+    compute_sigma_errors,
+    has_hidden_end,
+    list_right_types,
+    match_parts,
+    merge_alike,
+)
 from benchmarks.towns import (
     TOWNS,
     choose_buildings,
@@ -28,10 +46,12 @@ from benchmarks.wireframes import (
     sum_counts,
 )
 
+from benchmarks import results, tables
 from handmade import box
 from hiproof.compose import compose
 from hiproof.model import Building, Model, Roof
-from hiproof.simulate import random_compound
+from hiproof.simulate import COMPOUND_KINDS, random_building, random_compound
+from hiproof.simulate.roofs import make_part
 from hiproof.status import Status
 from hiproof.write import write_cityjson
 
@@ -79,10 +99,8 @@ def test_a_scan_lies_on_the_building_and_is_always_the_same(small_town):
     local = product.roof.frame.to_local(points)
     inside = shapely.contains_xy(product.roof.outline.buffer(-0.4), *local[:, :2].T)
     gap = product.roof.height_at(local[inside, :2]) - local[inside, 2]
-    assert (
-        inside.sum() > 3.0 * product.roof.outline.buffer(-0.4).area
-        and np.median(np.abs(gap)) < 0.08
-    )
+    assert inside.sum() > 3.0 * product.roof.outline.buffer(-0.4).area
+    assert np.median(np.abs(gap)) < 0.08
 
 
 @needs_judge
@@ -147,9 +165,9 @@ def test_draws_are_parts_of_the_whole_and_always_the_same():
     assert sorted(even + odd) == total and even[:2] == [0, 2]
     assert choose_buildings(total, step=10) == total[::10]
     draw = choose_buildings(total, limit=12)
-    assert (
-        len(draw) == 12 and draw == sorted(set(draw)) and draw == choose_buildings(total, limit=12)
-    )
+    assert len(draw) == 12
+    assert draw == sorted(set(draw))
+    assert draw == choose_buildings(total, limit=12)
     assert choose_buildings(total, limit=500) == total
 
 
@@ -188,3 +206,209 @@ def test_two_or_three_points_of_its_walls_are_no_part_of_a_gable(ending):
     building = next(b for b in read_town(TOWNS["nrw_5657"]) if b.id.endswith(ending))
     (model,), _ = model_all([building], [building.scan_points(2.0)], True)
     assert [part.type for part in model.parts] == ["gable"]
+
+
+def part(type="gable", x=0.0, y=0.0, z=3.0, kappa=0.0, **parameters):
+    parameters = parameters or {"length": 6.0, "width": 8.0, "height": 3.0}
+    return make_part(type, parameters, kappa, np.array([x, y, z]))
+
+
+@pytest.mark.parametrize("kind", COMPOUND_KINDS)
+def test_the_truth_is_right_in_any_order(kind):
+    for seed in range(4):
+        roof = random_compound(np.random.default_rng(seed), kind).roof
+        parts = merge_alike(roof.parts)
+        order = np.random.default_rng(seed).permutation(len(parts))
+        shuffled = [parts[k] for k in order]
+        n_expected, right, _ = compare_parts(roof, tuple(shuffled))
+        assert n_expected == len(parts) and right
+        assert [order[j] for j in match_parts(parts, shuffled, make_raster(roof.outline))] == list(
+            range(len(parts))
+        )
+
+
+def test_a_missing_a_needless_and_a_wrongly_named_part_are_wrong():
+    roof = random_compound(np.random.default_rng(3), "extension").roof
+    house, annex = roof.parts
+    hidden = part("flat", *annex.translation[:2], 0.5, annex.kappa, length=2.0, width=2.0)
+    misnamed = dataclasses.replace(annex, type="pyramid")
+    for parts in ((house,), (house, annex, hidden), (house, misnamed)):
+        assert not compare_parts(roof, parts)[1]
+
+
+def test_a_hidden_volume_does_not_change_what_stands_for_what():
+    roof = random_compound(np.random.default_rng(5), "T").roof
+    hidden = part("flat", *(roof.parts[0].translation - (0.0, 0.0, 0.5)), length=2.0, width=2.0)
+    xy = make_raster(roof.outline)
+    assert match_parts(roof.parts, (hidden, *roof.parts), xy) == [1, 2]
+    assert measure_visible_areas(dataclasses.replace(roof, parts=(hidden, *roof.parts)))[0] == 0.0
+
+
+def test_equal_neighbours_are_one_and_a_step_of_a_decimetre_keeps_them_apart():
+    alike = [part(x=6.0 * k) for k in range(4)]
+    merged = merge_alike(alike)
+    assert len(merged) == 1 and merged[0].area == pytest.approx(4 * 48.0)
+    assert merged[0].parameters == pytest.approx({"width": 8.0, "height": 3.0})
+    assert len(merge_alike([*alike[:2], part(x=12.0, z=3.1), part(x=18.0, z=3.1)])) == 2
+    assert len(merge_alike([alike[0], part(x=6.5)])) == 2  # half a metre of nothing between them
+    assert len(merge_alike([alike[0], part("flat", x=6.0, length=6.0, width=8.0)])) == 2
+
+
+def test_only_ends_under_another_part_are_hidden():
+    house = part(length=12.0, width=8.0, height=4.0)
+    wing = part(y=4.0, kappa=np.pi / 2, length=8.0, width=5.0, height=2.5)
+    assert has_hidden_end(wing, [house])
+    assert not has_hidden_end(house, [wing])
+    assert not has_hidden_end(house, [])
+    assert list_right_types(
+        part("hip", length=9.0, width=6.0, height=3.0, ridge_length=3.0), True
+    ) == {"hip", "side_hip"}
+    assert list_right_types(wing, True) == {"gable"}
+
+
+def test_an_asymmetric_gable_of_equal_slopes_may_be_called_a_gable():
+    size = {"length": 9.0, "width": 8.0, "height": 3.0, "ridge_offset": 1.0}
+    even = part("asymmetric_gable", **size, eave_step=3.0 * (1 - 3.0 / 5.0))
+    assert list_right_types(even, False) == {"asymmetric_gable", "gable"}
+    assert list_right_types(part("asymmetric_gable", **size, eave_step=0.0), False) == {
+        "asymmetric_gable"
+    }
+
+
+def test_errors_are_counted_in_sigmas_and_not_along_what_is_hidden():
+    truth = part()
+    sigma = {"width": 0.1, "length": 0.2, "height": 0.05, "t_x": 0.1, "t_z": 0.02, "kappa": 0.01}
+    fit = part(x=0.3, z=3.04, kappa=np.pi + 0.02, length=6.2, width=8.1, height=2.9)
+    fit = dataclasses.replace(fit, sigma=sigma)
+    expected = {"width": 1.0, "length": 1.0, "height": -2.0, "t_x": 3.0, "t_z": 2.0, "kappa": 2.0}
+    assert compute_sigma_errors(truth, fit, hidden=False) == pytest.approx(expected)
+    assert set(compute_sigma_errors(truth, fit, hidden=True)) == {"width", "height", "t_z", "kappa"}
+    assert compute_sigma_errors(dataclasses.replace(truth, type="hip"), fit, hidden=False) == {}
+    assert compute_sigma_errors(part(kappa=np.pi / 2), fit, hidden=False) == {}
+
+
+def test_normal_errors_of_their_sigma_have_a_root_mean_square_of_one():
+    rng, truth = np.random.default_rng(0), part()
+    heights = [
+        part(length=6.0, width=8.0, height=3.0 + 0.05 * error)
+        for error in rng.standard_normal(2000)
+    ]
+    ratios = [
+        compute_sigma_errors(truth, dataclasses.replace(p, sigma={"height": 0.05}), False)
+        for p in heights
+    ]
+    rms = np.sqrt(np.mean([ratio["height"] ** 2 for ratio in ratios]))
+    assert rms == pytest.approx(1.0, abs=0.05)
+
+
+def standing(roof, id="house"):
+    return Building(
+        id, Status.MODELLED, built=Model(roof, compose(roof, 0.0).move(roof.frame.origin))
+    )
+
+
+def test_areas_that_show_make_up_the_outline():
+    for kind in COMPOUND_KINDS:
+        roof = random_compound(np.random.default_rng(1), kind).roof
+        assert measure_visible_areas(roof).sum() == pytest.approx(roof.outline.area)
+    roof = random_building(np.random.default_rng(0), "hip").roof
+    model = standing(roof)
+    assert measure_named_share([model]) == 1.0
+    assert sum_area_by_type([model])["hip"] == pytest.approx(roof.outline.area)
+    free = standing(
+        dataclasses.replace(roof, parts=(dataclasses.replace(roof.parts[0], type="free"),))
+    )
+    assert measure_named_share([free]) == 0.0
+    assert measure_named_share([model, free]) == pytest.approx(0.5)
+
+
+PAGE = Path(results.__file__).with_name("RESULTS.md")
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.setattr(tables, "FIGURES", tmp_path)
+    monkeypatch.setattr("sys.argv", ["benchmarks/delft.py", "--record", "--shares", "1"])
+    return tmp_path
+
+
+def measure(share: float, is_kept: bool = True) -> None:
+    with tables.FigureTable(is_kept, "share of points", "within 0.2 m") as table:
+        table.add("1", share)
+
+
+def test_the_page_is_that_of_the_kept_figures():
+    assert PAGE.read_text(encoding="utf-8") == results.make_page(results.read_figures())
+
+
+def test_a_table_is_kept_in_place_of_the_one_by_the_same_arguments(folder, monkeypatch):
+    measure(0.93)
+    measure(0.94)
+    monkeypatch.setattr("sys.argv", ["benchmarks/delft.py"])
+    measure(0.95)
+    kept = results.read_figures(folder)["delft"]["tables"]
+    assert [(table["arguments"], table["rows"]) for table in kept] == [
+        ("--shares 1", [["1", "0.94"]]),
+        ("", [["1", "0.95"]]),
+    ]
+    page = results.make_page(results.read_figures(folder))
+    assert "| `--shares 1` | 1 | 0.94 |" in page and "|  | 1 | 0.95 |" in page
+
+
+def test_a_table_that_failed_or_is_not_to_be_kept_is_not(folder):
+    measure(0.93, is_kept=False)
+    with pytest.raises(ZeroDivisionError):
+        measure(1 / 0)
+    with pytest.raises(ValueError, match="no figure"), tables.FigureTable(True, "share"):
+        raise ValueError("no figure")
+    assert not list(folder.iterdir())
+
+
+def test_only_named_columns_are_shown_and_another_day_is_named():
+    table = {"arguments": "", "date": "2026-01-01", "commit": "a", "machine": "b"}
+    old = {**table, "columns": ["x", "y"], "rows": [["1", "2"]]}
+    new = {**old, "date": "2026-01-02", "arguments": "--fast"}
+    page = results.make_page({"delft": {"tables": [old, new], "show": ["y"], "notes": ["So."]}})
+    assert "| 2026-01-01 | 2 |" in page and "| `--fast` | 2 |" in page and "So." in page
+
+
+FOLDER = Path(__file__).parents[2] / "benchmarks"
+NAMES = sorted(path.stem for path in FOLDER.glob("*.py") if not path.stem.startswith("__"))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_all_that_a_benchmark_imports_is_there(name):
+    assert importlib.import_module(f"benchmarks.{name}").__doc__
+
+
+def test_a_stage_does_not_count_the_stages_inside_it():
+    new = 0.0
+
+    def work(seconds):
+        nonlocal new
+        new += seconds
+
+    clock = Clock(lambda: new)
+    inner = clock.time_stage("inner", lambda: work(2.0))
+
+    def outer():
+        work(1.0)
+        inner()
+        inner()
+
+    clock.time_stage("outer", outer)()
+    assert clock.seconds == {"inner": 4.0, "outer": 1.0}
+    assert sum(clock.seconds.values()) == new
+
+
+@pytest.mark.parametrize("place", STAGES.values(), ids=STAGES)
+def test_every_stage_is_a_function_of_a_run(place):
+    assert callable(resolve_name(place))
+
+
+def test_a_budget_that_misses_a_twentieth_of_the_time_is_refused():
+    clock = Clock()
+    clock.seconds["fit"] = 9.6
+    refuse_incomplete(clock, 10.0)
+    with pytest.raises(SystemExit, match="within 5%"):
+        refuse_incomplete(clock, 11.0)

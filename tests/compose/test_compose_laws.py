@@ -3,6 +3,7 @@ hard, over planes and outlines, and over roofs that once did not become a solid 
 """
 
 import json
+import math
 from pathlib import Path
 
 import numpy as np
@@ -10,12 +11,13 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from hypothesis.extra.numpy import arrays
 
 import roof_zoo
 from hiproof.compose import check_solid, compose, terrain_intersection
-from hiproof.compose.cells import equal_planes
+from hiproof.compose.arrangement import node
 from hiproof.compose.settle import settle_outlines
+from hiproof.errors import CompositionError
+from hiproof.frames import LocalFrame
 from hiproof.model import Part, Piece, Roof, Solid
 from hiproof.settings import Settings
 from roof_zoo import FRAME, KINDS, generate_roof, move_roof
@@ -74,12 +76,8 @@ def test_solid_is_valid_also_in_the_world_and_rounded_as_written(solids, kind):
 
 def measure_roof_heights(solid):
     """Lowest and highest height of a solid's roof faces."""
-    z = solid.vertices[
-        np.unique(
-            [v for face in solid.select_faces("RoofSurface") for ring in face.rings for v in ring]
-        ),
-        2,
-    ]
+    rings = [ring for face in solid.select_faces("RoofSurface") for ring in face.rings]
+    z = solid.vertices[np.concatenate(rings), 2]
     return z.min(), z.max()
 
 
@@ -118,9 +116,7 @@ def test_roof_of_the_solid_is_the_height_function(solids, kind):
         result, covering = measure_roof_height(solid, xy)
         assert (covering == 1).all()
         is_wrong = np.abs(result - expected)[np.isfinite(expected)] > 2e-3
-        assert is_wrong.mean() < 2e-3, (
-            f"{kind} {seed}: {is_wrong.sum()} of {len(is_wrong)} points off"
-        )
+        assert is_wrong.mean() < 2e-3, f"{kind} {seed}"
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -166,65 +162,45 @@ def test_same_roof_same_bytes():
 HOUSE = shapely.box(0, 0, 10, 8)
 GABLE = np.array([[0.0, 0.5, 5.0], [0.0, -0.5, 9.0]])
 HIP = np.vstack((GABLE, [[0.5, 0.0, 5.0], [-0.5, 0.0, 10.0]]))
+
+
+PYRAMID = HIP - [[0, 0, 0], [0, 0, 1], [0, 0, 0], [0, 0, 1]]
+
+
+def level(z, box=HOUSE):
+    return Piece(box, np.array([[0.0, 0, z]]))
+
+
+# pieces, outline, and how many faces of roof, walls and ground
 COUNTS = {
-    "flat": ([Piece(HOUSE, np.array([[0.0, 0, 5]]))], HOUSE, (1, 4, 1)),
+    "flat": ([level(5)], HOUSE, (1, 4, 1)),
     "gable": ([Piece(HOUSE, GABLE)], HOUSE, (2, 4, 1)),
     "hip": ([Piece(HOUSE, HIP)], HOUSE, (4, 4, 1)),
-    "pyramid": (
-        [Piece(shapely.box(0, 0, 8, 8), HIP - [[0, 0, 0], [0, 0, 1], [0, 0, 0], [0, 0, 1]])],
-        None,
-        (4, 4, 1),
-    ),
-    "gable clipped to an L": (
-        [Piece(HOUSE, GABLE)],
-        HOUSE.difference(shapely.box(6, 4.5, 10, 8)),
-        (2, 6, 1),
-    ),
-    "gable around a courtyard": (
-        [Piece(HOUSE, GABLE)],
-        HOUSE.difference(shapely.box(3, 3, 5, 5)),
-        (2, 8, 1),
-    ),
+    "pyramid": ([Piece(shapely.box(0, 0, 8, 8), PYRAMID)], shapely.box(0, 0, 8, 8), (4, 4, 1)),
+    "gable clipped to an L": ([Piece(HOUSE, GABLE)], HOUSE - shapely.box(6, 4.5, 10, 8), (2, 6, 1)),
+    "gable around a courtyard": ([Piece(HOUSE, GABLE)], HOUSE - shapely.box(3, 3, 5, 5), (2, 8, 1)),
     "two levels": (
-        [
-            Piece(HOUSE, np.array([[0.0, 0, 5]])),
-            Piece(shapely.box(10, 0, 14, 8), np.array([[0.0, 0, 3]])),
-        ],
+        [level(5), level(3, shapely.box(10, 0, 14, 8))],
         shapely.box(0, 0, 14, 8),
         (2, 5, 1),
     ),
-    "tower in the middle": (
-        [
-            Piece(HOUSE, np.array([[0.0, 0, 5]])),
-            Piece(shapely.box(4, 3, 6, 5), np.array([[0.0, 0, 9]])),
-        ],
-        HOUSE,
-        (2, 8, 1),
-    ),
+    "tower in the middle": ([level(5), level(9, shapely.box(4, 3, 6, 5))], HOUSE, (2, 8, 1)),
 }
 
 
 @pytest.mark.parametrize("name", COUNTS)
 def test_faces_of_small_cases(name):
     pieces, outline, counts = COUNTS[name]
-    roof = roof_zoo.roof(pieces, outline or pieces[0].outline)
-    solid = compose(roof, 0.0)
-    assert (
-        tuple(
-            len(solid.select_faces(kind))
-            for kind in ("RoofSurface", "WallSurface", "GroundSurface")
-        )
-        == counts
-    )
-    assert len(solid.select_faces("GroundSurface")[0].rings) == 1 + len(roof.outline.interiors)
+    solid, kinds = compose(roof_zoo.roof(pieces, outline), 0.0), ("Roof", "Wall", "Ground")
+    assert tuple(len(solid.select_faces(f"{kind}Surface")) for kind in kinds) == counts
+    assert len(solid.select_faces("GroundSurface")[0].rings) == 1 + len(outline.interiors)
 
 
 def test_roof_faces_name_their_part():
     pieces, outline, _ = COUNTS["two levels"]
     solid = compose(roof_zoo.roof(pieces, outline), 0.0)
-    heights = {
-        face.part: solid.vertices[face.rings[0][0], 2] for face in solid.select_faces("RoofSurface")
-    }
+    roofs = solid.select_faces("RoofSurface")
+    heights = {face.part: solid.vertices[face.rings[0][0], 2] for face in roofs}
     assert heights == {0: 5.0, 1: 3.0}
     assert {face.part for face in solid.faces if face.kind != "RoofSurface"} == {-1}
 
@@ -240,9 +216,7 @@ def test_gap_takes_the_roof_of_the_piece_beside_it():
 
 def test_levels_meeting_crosswise_are_set_back():
     boxes = [shapely.box(x, y, x + 4, y + 4) for x in (0, 4) for y in (0, 4)]
-    pieces = [
-        Piece(box, np.array([[0.0, 0.0, z]])) for box, z in zip(boxes, (9, 5, 5, 8), strict=True)
-    ]
+    pieces = [level(z, box) for box, z in zip(boxes, (9, 5, 5, 8), strict=True)]
     solid = compose(roof_zoo.roof(pieces, shapely.box(0, 0, 8, 8)), 0.0)
     assert check_solid(solid) == ()
     assert solid.volume == pytest.approx(16 * (9 + 5 + 5 + 8), abs=0.01)
@@ -278,15 +252,6 @@ def test_terrain_that_knows_nothing_leaves_the_floor():
     assert (line[:, 2] == -1.5).all()
 
 
-NUMBERS = st.sampled_from([0.0, 0.5, 0.5 + 6e-7, 0.5 + 2e-6, 4.0])
-
-
-@given(arrays(float, st.tuples(st.integers(1, 12), st.just(3)), elements=NUMBERS))
-def test_each_plane_has_the_number_of_the_first_that_equals_it(planes):
-    is_equal = (np.abs(planes[:, None] - planes) < 1e-6).all(axis=2)
-    assert equal_planes(planes).tolist() == is_equal.argmax(axis=1).tolist()
-
-
 GRID_M = 1e-4
 
 
@@ -317,17 +282,133 @@ ROOFS = sorted((Path(__file__).parents[1] / "regressions").glob("*/roof.json"))
 
 
 def read_roof(path):
+    def read_piece(piece):
+        return Piece(shapely.from_wkt(piece["outline"]), np.array(piece["planes"]))
+
     stored = json.loads(path.read_text())
-    parts = [
-        Part(
-            "free",
-            tuple(Piece(shapely.from_wkt(p["outline"]), np.array(p["planes"])) for p in pieces),
-        )
-        for pieces in stored["parts"]
-    ]
-    return Roof(tuple(parts), shapely.from_wkt(stored["outline"]), FRAME)
+    parts = tuple(Part("free", tuple(map(read_piece, pieces))) for pieces in stored["parts"])
+    return Roof(parts, shapely.from_wkt(stored["outline"]), FRAME)
 
 
 @pytest.mark.parametrize("path", ROOFS, ids=lambda path: path.parent.name)
 def test_roof_becomes_a_valid_solid(path):
     assert check_solid(compose(read_roof(path), -2.0)) == ()
+
+
+FLAT = np.array([[0.0, 0.0, 5.0]])
+
+
+@pytest.mark.parametrize(
+    ("roof", "sentence"),
+    [
+        (Roof((), HOUSE, FRAME), "at least one piece"),
+        (
+            Roof((Part("flat", (Piece(HOUSE, np.zeros((0, 3))),)),), HOUSE, FRAME),
+            "at least one piece",
+        ),
+        (Roof((Part("flat", (Piece(HOUSE, FLAT),)),), shapely.Polygon(), FRAME), "outline"),
+        (Roof((Part("flat", (Piece(HOUSE, FLAT * np.nan),)),), HOUSE, FRAME), "finite roof planes"),
+        (
+            Roof((Part("flat", (Piece(HOUSE, FLAT),)),), shapely.box(1e6, 0, 1e6 + 9, 9), FRAME),
+            "local frame",
+        ),
+        (Roof((Part("flat", (Piece(HOUSE, FLAT),)),), shapely.box(0, 0, 10, 1e-5), FRAME), "area"),
+    ],
+)
+def test_unusable_roof_raises_a_sentence(roof, sentence):
+    with pytest.raises(CompositionError, match=sentence):
+        compose(roof, 0.0)
+
+
+@pytest.mark.parametrize("z_ground", [np.nan, np.inf, -np.inf])
+def test_ground_must_be_finite(z_ground):
+    with pytest.raises(CompositionError, match="finite ground height"):
+        roof_zoo.flat_block(HOUSE, 5.0, z_ground)
+
+
+def test_piece_far_from_the_outline_still_roofs_it():
+    roof = roof_zoo.roof([Piece(shapely.box(50, 50, 60, 60), FLAT)], HOUSE)
+    assert compose(roof, 0.0).volume == pytest.approx(400.0)
+
+
+OUTLINES = {
+    "the larger half of a bow tie": ([(0, 0), (10, 4), (10, 0), (0, 6)], 90.0, 5),
+    "the larger side of a neck thinner than a millimetre": (
+        [(0, 0), (5, 0), (5, 2), (8, 2), (8, 0), (10, 0), (10, 5), (8, 5), (8, 2.0005), (5, 2.0005)]
+        + [(5, 5), (0, 5)],
+        125.0,
+        6,
+    ),
+    "a box of repeated and collinear vertices": (
+        [(0, 0), (0, 0), (5, 0), (5.0002, 0), (10, 0), (10, 8), (10, 8.0004), (0, 8)],
+        400.0,
+        6,
+    ),
+    "a box without its spike": (
+        [(0, 0), (10, 0), (10, 4), (15, 4.0003), (10, 4.0006), (10, 8), (0, 8)],
+        400.0,
+        6,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", OUTLINES)
+def test_of_an_odd_outline_a_block_is_left(name):
+    ring, volume, faces = OUTLINES[name]
+    _, solid = roof_zoo.flat_block(shapely.Polygon(ring), 5.0, 0.0)
+    assert check_solid(solid) == () and len(solid.faces) == faces
+    assert solid.volume == pytest.approx(volume, abs=0.02)
+
+
+def test_slivers_join_a_neighbour_by_the_settings():
+    pieces = [
+        Piece(shapely.box(0, 0, 5, 8), FLAT),
+        Piece(shapely.box(5, 0, 5.05, 8), FLAT + [[0, 0, 1]]),
+    ]
+    pieces.append(Piece(shapely.box(5.05, 0, 10, 8), FLAT + [[0, 0, 2]]))
+    roof = roof_zoo.roof(pieces, HOUSE)
+    narrow, wide = (
+        Settings.from_dict({"compose": {"min_face_width_m": width}}) for width in (0.01, 0.1)
+    )
+    assert len(compose(roof, 0.0, narrow).select_faces("RoofSurface")) == 3
+    assert len(compose(roof, 0.0, wide).select_faces("RoofSurface")) == 2
+    assert len(compose(roof, 0.0).select_faces("RoofSurface")) == 2
+
+
+def test_coordinates_are_multiples_of_a_tenth_of_a_millimetre():
+    solid = compose(roof_zoo.generate_roof("cross_gables", 1), -1.23456789)
+    assert np.abs(solid.vertices * 1e4 - np.rint(solid.vertices * 1e4)).max() < 1e-6
+
+
+REACH = 12.0
+
+
+def test_two_vertices_as_far_apart_as_the_reach_come_to_rest():
+    """Each lay beside the edge from the other to a third one, and was put into it in turn."""
+    segments = [
+        [299967, 700000, 299967, 700051],
+        [408500, 799900, 299966, 799900],
+        [299978, 799900, 299978, 700051],
+    ]
+    xy, edges = node(np.array(segments), REACH)
+    pairs = {frozenset(map(tuple, xy[edge].tolist())) for edge in edges}
+    assert frozenset([(299978, 799900), (299967, 700051)]) in pairs
+    assert len(edges) == 4
+
+
+def make_checkerboard(squares):
+    """A roof of squares of 2 m, low and high in turn."""
+    parts = []
+    for i in range(squares):
+        for j in range(squares):
+            box = shapely.box(2.0 * i, 2.0 * j, 2.0 * i + 2.0, 2.0 * j + 2.0)
+            plane = np.array([[0.0, 0.0, 4.0 + 3.0 * ((i + j) % 2)]])
+            parts.append(Part("flat", (Piece(box, plane),)))
+    outline = shapely.box(0.0, 0.0, 2.0 * squares, 2.0 * squares)
+    return Roof(tuple(parts), outline, LocalFrame(np.zeros(3)))
+
+
+def test_any_number_of_crosswise_corners_is_mended():
+    solid = compose(make_checkerboard(9), 0.0)
+    assert not check_solid(solid)
+    assert math.isclose(solid.volume, 4.0 * (41 * 4.0 + 40 * 7.0), rel_tol=1e-3)

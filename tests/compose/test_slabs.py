@@ -6,7 +6,6 @@ import shapely
 
 import hiproof
 from hiproof.compose import check_solid, compose
-from hiproof.compose import eaves as valid_eaves
 from hiproof.compose.eaves import add_eaves, add_valid_eaves, measure_left_out
 from hiproof.compose.settle import settled_roof
 from hiproof.errors import CompositionError
@@ -15,7 +14,20 @@ from hiproof.model import CEILING, GROUND, Eaves, Model, Overhang
 from hiproof.simulate.compounds import COMPOUND_KINDS, random_compound
 
 THICKNESS_M = 0.2
-LEFT, RIGHT = ([[x, -4], [x + 6, -4], [x + 6, 4], [x, 4]] for x in (-6, 0))
+
+
+def make_part(kind, box, z, **size):
+    """The record of a part over a box (x0, y0, x1, y1)."""
+    x0, y0, x1, y1 = box
+    ring = shapely.get_coordinates(shapely.box(*box))[:-1].tolist()
+    size = {"width": y1 - y0, "length": x1 - x0, **size}
+    place = [(x0 + x1) / 2, (y0 + y1) / 2, z]
+    return {"type": kind, "parameters": size, "position": place, "outlines": [[ring]]}
+
+
+def build_model(ring, parts):
+    record = {"id": "a", "origin": [0, 0, 0], "outline": [ring], "z_ground": 0}
+    return hiproof.build(record | {"parts": parts}).model
 
 
 def make_eaves(lengths, thickness=THICKNESS_M, kind="walls"):
@@ -25,18 +37,9 @@ def make_eaves(lengths, thickness=THICKNESS_M, kind="walls"):
 
 def build_pair(rise, z=5.0, step=0.0):
     """Two gables side by side, the right one by `step` higher and of another rise."""
-    parts = [
-        {
-            "type": "gable",
-            "parameters": {"width": 8, "length": 6, "height": height},
-            "position": [x, 0, eave],
-            "outlines": [[ring]],
-        }
-        for x, ring, height, eave in ((-3, LEFT, 3.0, z), (3, RIGHT, rise, z + step))
-    ]
-    ring = [[-6, -4], [6, -4], [6, 4], [-6, 4]]
-    record = {"id": "a", "origin": [0, 0, 0], "outline": [ring], "z_ground": 0, "parts": parts}
-    return hiproof.build(record).model
+    left = make_part("gable", (-6, -4, 0, 4), z, height=3)
+    right = make_part("gable", (0, -4, 6, 4), z + step, height=rise)
+    return build_model([[-6, -4], [6, -4], [6, 4], [-6, 4]], [left, right])
 
 
 @pytest.mark.parametrize(("rise", "step"), [(3.0, 0.1), (3.0, 0.2), (3.0, 2.0), (2.2, 0.3)])
@@ -96,39 +99,9 @@ def test_only_the_eaves_that_hang_too_low_lose_their_overhang():
 
 def build_blocks(*blocks):
     """Level roofs over boxes (x0, y0, x1, y1) at heights z, under one outline."""
-    boxes = [shapely.box(*box) for box, _ in blocks]
-    parts = [
-        {
-            "type": "flat",
-            "parameters": {"width": box[3] - box[1], "length": box[2] - box[0]},
-            "position": [(box[0] + box[2]) / 2, (box[1] + box[3]) / 2, z],
-            "outlines": [[shapely.get_coordinates(area)[:-1].tolist()]],
-        }
-        for area, (box, z) in zip(boxes, blocks, strict=True)
-    ]
-    outline = shapely.union_all(boxes)
-    ring = shapely.get_coordinates(shapely.orient_polygons(outline).normalize())[:-1]
-    record = {"id": "a", "origin": [0, 0, 0], "outline": [ring.tolist()], "z_ground": 0}
-    return hiproof.build(record | {"parts": parts}).model
-
-
-@pytest.mark.parametrize("bad", [{0}, {3, 17}, {0, 1, 2, 39}, set(range(40))])
-def test_overhangs_are_kept_but_for_those_that_fail(bad, monkeypatch):
-    tried = []
-
-    def is_valid(_, overhangs):
-        tried.append(overhangs)
-        return not bad & set(overhangs)
-
-    monkeypatch.setattr(valid_eaves, "is_valid", is_valid)
-    monkeypatch.setattr(valid_eaves, "select_overhangs", lambda _, overhangs: overhangs)
-    kept = valid_eaves.keep_valid(None, None, list(range(40)))
-    assert kept == [k for k in range(40) if k not in bad]
-    # a building of many overhangs that all fail ends soon, and keeps none
-    tried.clear()
-    bad = set(range(1000))
-    assert valid_eaves.keep_valid(None, None, list(range(1000))) == []
-    assert len(tried) == valid_eaves.MOST_TRIALS
+    outline = shapely.orient_polygons(shapely.union_all([shapely.box(*box) for box, _ in blocks]))
+    ring = shapely.get_coordinates(outline.normalize())[:-1].tolist()
+    return build_model(ring, [make_part("flat", box, z) for box, z in blocks])
 
 
 def test_a_low_roof_too_narrow_for_walls_inside_keeps_its_own():

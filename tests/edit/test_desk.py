@@ -55,9 +55,8 @@ def test_from_a_wrong_type_to_a_rebuilt_city(town_files, folder, desk):
     assert next(row for row in desk.buildings()["rows"] if row["id"] == ID)["type"] == "gable"
     assert all(new[id] == old[id] for id in old if id != ID)
     solids = dict(read_solids(folder / "buildings.gml"))
-    assert len(solids) == len(old) and not any(
-        check_solid(solid, planarity_m=0.01) for solid in solids.values()
-    )
+    assert len(solids) == len(old)
+    assert not any(check_solid(solid, planarity_m=0.01) for solid in solids.values())
 
 
 def test_on_a_level_roof_a_dormer_is_a_block_that_a_hand_can_size(desk):
@@ -155,21 +154,17 @@ def raise_gable(desk):
 def test_every_edit_gives_a_valid_model(desk):
     gable = raise_gable(desk)
     halves = edit(desk, gable["parts"], action="split", part=0)
-    assert len(halves["parts"]) == 2 and halves["figures"]["volume_m3"] == pytest.approx(
-        gable["figures"]["volume_m3"], abs=0.2
-    )
+    assert len(halves["parts"]) == 2
+    assert halves["figures"]["volume_m3"] == pytest.approx(gable["figures"]["volume_m3"], abs=0.2)
     merged = edit(desk, halves["parts"], action="merge", part=0, other=1)
-    assert len(merged["parts"]) == 1 and merged["figures"]["volume_m3"] == pytest.approx(
-        gable["figures"]["volume_m3"], abs=0.2
-    )
+    assert len(merged["parts"]) == 1
+    assert merged["figures"]["volume_m3"] == pytest.approx(gable["figures"]["volume_m3"], abs=0.2)
     assert merged["parts"][0]["parameters"]["length"] == pytest.approx(
         gable["parts"][0]["parameters"]["length"], abs=1e-3
     )
     dormer = edit(desk, merged["parts"], action="dormer", part=0)
-    assert (
-        len(dormer["parts"]) == 2
-        and dormer["figures"]["volume_m3"] > merged["figures"]["volume_m3"] + 0.1
-    )
+    assert len(dormer["parts"]) == 2
+    assert dormer["figures"]["volume_m3"] > merged["figures"]["volume_m3"] + 0.1
     without_dormer = edit(desk, dormer["parts"], action="remove", part=1)
     assert without_dormer["mesh"] == merged["mesh"]
 
@@ -272,9 +267,8 @@ def test_the_file_starts_with_the_overrides_that_the_run_obeyed(town_files, fold
     desk = Desk(folder, "anna")
     desk.accept(ID, {"parts": desk.building(ID)["parts"], "version": UNTOUCHED})
     stored = dict(read_overrides(str(folder / EDITS_FILE)))
-    assert (
-        stored["house-1"] == {"id": "house-1", "ridge_height": 9.5} and stored[ID]["who"] == "anna"
-    )
+    assert stored["house-1"] == {"id": "house-1", "ridge_height": 9.5}
+    assert stored[ID]["who"] == "anna"
 
 
 def test_points_are_those_of_the_run(desk):
@@ -314,9 +308,8 @@ def run_by_relative_names(town_files, tmp_path, monkeypatch):
 
 def test_a_run_made_by_relative_names_is_known_from_anywhere(run_by_relative_names):
     desk = Desk(run_by_relative_names / "run", "anna")
-    assert desk.cloud(ID)["missing"] == "" and desk.cloud(ID)["count"] == int(
-        desk.run.record(ID)["points"]
-    )
+    assert desk.cloud(ID)["missing"] == ""
+    assert desk.cloud(ID)["count"] == int(desk.run.record(ID)["points"])
     assert desk.edits.of("house-1")[0] == {"id": "house-1", "ridge_height": 9.5}
     run = evaluate_run(run_by_relative_names / "run")
     assert len(run.clouds) == 1 and sum(map(len, run.points)) and None not in run.footprints
@@ -349,10 +342,8 @@ def test_files_that_moved_are_found_in_the_folder_that_a_person_names(
     with pytest.warns(InputWarning, match="points are gone"):
         assert evaluate_run(run).clouds == ()
     desk = Desk(run, "anna", files)
-    assert (
-        desk.cloud(ID)["count"] == int(desk.run.record(ID)["points"])
-        and desk.edits.of("house-1")[0]
-    )
+    assert desk.cloud(ID)["count"] == int(desk.run.record(ID)["points"])
+    assert desk.edits.of("house-1")[0]
 
 
 def test_points_that_can_no_longer_be_read_are_said_once(town_files, tmp_path):

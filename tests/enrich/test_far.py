@@ -69,9 +69,8 @@ def test_terrain_of_other_heights_is_refused(ground, tmp_path):
     folder = write_street(tmp_path / "run", [place_house(f"h{k}", 30.0 * k, 0) for k in range(3)])
     hill = write_hill(tmp_path / "hill.tif", ground=ground)
     settings = EnrichSettings(sun=True, shading_terrain=hill)
-    with pytest.raises(
-        InputError, match=re.escape(f"which lies {ground:+.1f} m from it; check its height")
-    ):
+    sentence = re.escape(f"which lies {ground:+.1f} m from it; check its height")
+    with pytest.raises(InputError, match=sentence):
         enrich_run(folder, settings=settings)
 
 

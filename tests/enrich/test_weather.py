@@ -222,9 +222,8 @@ def test_a_station_has_a_place(place, tmp_path):
     write_epw(tmp_path / "a.epw")
     text = (tmp_path / "a.epw").read_text()
     (tmp_path / "a.epw").write_text(text.replace("52.0", place, 1))
-    with pytest.raises(
-        InputError, match=r"expected weather of a typical year .*, got a file of an"
-    ):
+    sentence = r"expected weather of a typical year .*, got a file of an"
+    with pytest.raises(InputError, match=sentence):
         read_year(str(tmp_path / "a.epw"))
 
 

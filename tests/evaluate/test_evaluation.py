@@ -1,6 +1,4 @@
-"""A whole run measured against points, footprints and a reference whose figures are
-known by hand.
-"""
+"""A whole run measured against points, footprints and a reference of known figures."""
 
 import csv
 import json
@@ -12,7 +10,7 @@ import shapely
 
 from hiproof.cli.app import import_command
 from hiproof.cli.evaluate import evaluate
-from hiproof.errors import HiproofError, InputWarning
+from hiproof.errors import HiproofError, InputError, InputWarning
 from hiproof.evaluate.evaluation import (
     compare,
     evaluate_building,
@@ -23,7 +21,7 @@ from hiproof.evaluate.evaluation import (
     to_json,
 )
 from hiproof.evaluate.metrics import plan_outline
-from hiproof.evaluate.models import BuildingModel
+from hiproof.evaluate.models import BuildingModel, read_models, run_models
 from hiproof.evaluate.run import evaluate_run, outline_of_solid
 from layers import write_layer
 from sample_models import ORIGIN, courtyard_solid, gable_solid, write_sample_run
@@ -44,37 +42,27 @@ def test_figures_are_those_the_points_were_made_with(run):
     assert gable.quality.rmse == pytest.approx(0.02 * math.cos(math.atan(0.75)), rel=0.2)
     assert block.quality.rmse == pytest.approx(0.02, rel=0.1)
     assert gable.quality.share_within_20cm == 1
-    assert gable.volume_m3 == pytest.approx(8 * 12 * 5.5) and block.volume_m3 == pytest.approx(
-        336 * 9
-    )
+    assert gable.volume_m3 == pytest.approx(8 * 12 * 5.5)
+    assert block.volume_m3 == pytest.approx(336 * 9)
     assert bare.status == "no_points" and bare.quality.points == 0
 
 
 def test_a_model_equals_itself(run):
-    self_comparison = run.figures[0].comparison
-    assert self_comparison.reference_id == "house-1" and self_comparison.plan_iou == pytest.approx(
-        1
-    )
-    assert (
-        self_comparison.ridge_height_m,
-        self_comparison.slope_deg,
-        self_comparison.azimuth_deg,
-        self_comparison.volume_m3,
-    ) == (0, 0, 0, 0)
+    comparison = run.figures[0].comparison
+    assert comparison.reference_id == "house-1"
+    assert comparison.plan_iou == pytest.approx(1)
+    assert comparison.ridge_height_m == comparison.slope_deg == 0
+    assert comparison.azimuth_deg == comparison.volume_m3 == 0
 
 
 def test_a_reference_from_elsewhere_is_told_of(sample_run, tmp_path):
-    text = (
-        (sample_run / "buildings.city.jsonl")
-        .read_text()
-        .replace('"house-1"', '"a"')
-        .replace('"block 2"', '"b"')
-    )
-    (tmp_path / "other.city.jsonl").write_text(
-        text.replace(str(ORIGIN[0]), str(ORIGIN[0] + 5000)).replace('"bare"', '"c"')
-    )
+    text = (sample_run / "buildings.city.jsonl").read_text()
+    for old, new in (("house-1", "a"), ("block 2", "b"), ("bare", "c")):
+        text = text.replace(f'"{old}"', f'"{new}"')
+    other = tmp_path / "other.city.jsonl"
+    other.write_text(text.replace(str(ORIGIN[0]), str(ORIGIN[0] + 5000)))
     with pytest.warns(InputWarning, match="no building of it stands where one of the run does"):
-        evaluate_run(sample_run, reference=str(tmp_path / "other.city.jsonl"))
+        evaluate_run(sample_run, reference=str(other))
 
 
 def test_differences_have_the_sign_of_ours_minus_theirs():
@@ -92,20 +80,10 @@ def test_a_reference_without_roof_surfaces_gives_no_figures():
 
 
 def test_footprints_bring_points_beyond_the_roof(tmp_path, sample_run):
-    path = tmp_path / "areas.geojson"
     west, south = ORIGIN[:2]
-    ring = [
-        [west - 4, south],
-        [west + 8, south],
-        [west + 8, south + 12],
-        [west - 4, south + 12],
-        [west - 4, south],
-    ]
-    geometry = {"type": "Polygon", "coordinates": [ring]}
-    crs = {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::28992"}}
-    feature = {"type": "Feature", "properties": {}, "geometry": geometry}
-    path.write_text(json.dumps({"type": "FeatureCollection", "crs": crs, "features": [feature]}))
-    run = evaluate_run(sample_run, [str(sample_run / "points.xyz")], footprints=str(path))
+    area = shapely.box(west - 4, south, west + 8, south + 12)
+    path = str(write_layer(tmp_path / "areas.geojson", [area]))
+    run = evaluate_run(sample_run, [str(sample_run / "points.xyz")], footprints=path)
     assert run.figures[0].quality.outline_iou == pytest.approx(8 / 12)
 
 
@@ -123,10 +101,9 @@ def test_a_number_that_is_anothers_id_elsewhere_is_not_taken_for_it(ids, expecte
 
 
 def test_where_nothing_lies_nearby_the_id_tells():
-    distant_area = shapely.box(900, 900, 910, 910)
-    assert match_by_id_or_overlap(
-        [block("a", 0.0), BuildingModel("b")], [("b", distant_area), ("a", distant_area)]
-    ) == [1, 0]
+    far = shapely.box(900, 900, 910, 910)
+    models = [block("a", 0.0), BuildingModel("b")]
+    assert match_by_id_or_overlap(models, [("b", far), ("a", far)]) == [1, 0]
     assert match_by_id_or_overlap([block("a", 0.0)], []) == [None]
 
 
@@ -157,14 +134,14 @@ def test_points_go_to_every_outline_that_holds_them():
 def test_rows_survive_csv_and_json(run):
     rows = list(csv.DictReader(to_csv(run.figures).splitlines()))
     assert [row["id"] for row in rows] == ["house-1", "block 2", "bare"]
-    assert float(rows[0]["rmse"]) == pytest.approx(run.figures[0].quality.rmse, abs=1e-6)
+    errors = [figures.quality.rmse for figures in run.figures[:2]]
+    assert float(rows[0]["rmse"]) == pytest.approx(errors[0], abs=1e-6)
     assert rows[2]["rmse"] == "" and rows[0]["ref_id"] == "house-1"
     document = json.loads(to_json(run.figures))
     assert document["buildings"][2]["rmse"] is None
     assert document["summary"]["gable"]["buildings"] == 1
-    assert document["summary"]["all"]["rmse"]["mean"] == pytest.approx(
-        (run.figures[0].quality.rmse + run.figures[1].quality.rmse) / 2, abs=1e-6
-    )
+    mean = document["summary"]["all"]["rmse"]["mean"]
+    assert mean == pytest.approx(sum(errors) / 2, abs=1e-6)
 
 
 def test_nothing_to_summarise():
@@ -175,22 +152,17 @@ def test_nothing_to_summarise():
 def test_a_building_without_a_model_misses_all_its_points():
     points = np.random.default_rng(0).uniform((1, 1, 0), (9, 5, 6), (20, 3))
     figures = evaluate_building(BuildingModel("a"), points, shapely.box(0, 0, 10, 6))
-    assert (
-        figures.quality.share_within_20cm == 0
-        and figures.quality.points == 20
-        and figures.status == "no_model"
-    )
+    assert figures.quality.share_within_20cm == 0
+    assert figures.quality.points == 20
+    assert figures.status == "no_model"
 
 
 def test_the_command_writes_both_tables(sample_run, tmp_path):
-    import_command("evaluate")(
-        [str(sample_run), str(sample_run / "points.xyz"), "--out", str(tmp_path)],
-        standalone_mode=False,
-    )
+    words = [str(sample_run), str(sample_run / "points.xyz"), "--out", str(tmp_path)]
+    import_command("evaluate")(words, standalone_mode=False)
     assert len((tmp_path / "evaluation.csv").read_text().splitlines()) == 4
-    assert (
-        json.loads((tmp_path / "evaluation.json").read_text())["summary"]["all"]["buildings"] == 3
-    )
+    summary = json.loads((tmp_path / "evaluation.json").read_text())["summary"]
+    assert summary["all"]["buildings"] == 3
 
 
 def test_the_tables_fit_a_narrow_terminal(sample_run, tmp_path, monkeypatch, capsys):
@@ -198,12 +170,10 @@ def test_the_tables_fit_a_narrow_terminal(sample_run, tmp_path, monkeypatch, cap
     points, reference = str(sample_run / "points.xyz"), str(sample_run / "buildings.city.jsonl")
     evaluate(sample_run, [points], reference=reference, out=tmp_path)
     output = capsys.readouterr().out
-    assert (
-        "…" not in output
-        and output.count("buildings") >= 2
-        and "volume" in output
-        and "0.000" in output
-    )
+    assert "…" not in output
+    assert output.count("buildings") >= 2
+    assert "volume" in output
+    assert "0.000" in output
 
 
 def test_buildings_that_no_mean_holds_are_counted(sample_run, tmp_path, capsys):
@@ -222,9 +192,8 @@ def test_the_clouds_are_the_runs_own_where_none_are_named(sample_run, tmp_path):
     (tmp_path / "run.json").write_text(json.dumps({**record, "inputs": {"clouds": [cloud]}}))
     evaluate(tmp_path, out=tmp_path / "own")
     evaluate(tmp_path, [cloud], out=tmp_path / "named")
-    assert (tmp_path / "own" / "evaluation.csv").read_text() == (
-        tmp_path / "named" / "evaluation.csv"
-    ).read_text()
+    own, named = ((tmp_path / name / "evaluation.csv").read_text() for name in ("own", "named"))
+    assert own == named
 
 
 def test_buildings_of_which_no_place_is_known_have_no_points(sample_run, tmp_path):
@@ -251,3 +220,65 @@ def test_what_cannot_be_measured_is_refused(clouds, record, message, tmp_path):
         (tmp_path / "run.json").write_text(record)
     with pytest.raises(HiproofError, match=message):
         evaluate(tmp_path, clouds)
+
+
+def test_a_run_comes_back_as_written(tmp_path):
+    solids = write_sample_run(tmp_path)
+    models = {model.id: model for model in read_models(run_models(tmp_path))}
+    assert list(models) == ["house-1", "block 2", "bare"]
+    assert [model.roof_type for model in models.values()] == ["gable", "flat", "unknown"]
+    assert [model.status for model in models.values()] == ["modelled", "modelled", "no_points"]
+    assert models["bare"].solid is None
+    for id, solid in solids.items():
+        np.testing.assert_allclose(models[id].solid.vertices, solid.vertices, atol=1e-4)
+        assert models[id].solid.faces == solid.faces
+
+
+def test_a_document_with_parts_joins_their_solids(tmp_path):
+    cube = {"type": "Solid", "lod": "2.2", "boundaries": [[[[0, 1, 2]], [[0, 2, 3]]]]}
+    objects = {
+        "a": {"type": "Building", "children": ["a-0", "a-1"], "attributes": {"name": "x"}},
+        "a-0": {
+            "type": "BuildingPart",
+            "parents": ["a"],
+            "geometry": [{**cube, "lod": "1.2"}, cube],
+        },
+        "a-1": {"type": "BuildingPart", "parents": ["a"], "geometry": [cube]},
+    }
+    document = {"type": "CityJSON", "version": "2.0", "CityObjects": objects}
+    document |= {"vertices": [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [9, 9, 9]]}
+    path = tmp_path / "part.city.json"
+    path.write_text(json.dumps(document))
+    (model,) = read_models(path)
+    assert len(model.solid.faces) == 4
+    assert len(model.solid.vertices) == 4
+    assert model.status == "modelled"
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "not json", "[]", '{"type": "CityJSON"}', '{"CityObjects": {"a": {}}, "vertices": []}'],
+)
+def test_what_is_no_cityjson_is_refused_in_a_sentence(tmp_path, text):
+    path = tmp_path / "bad.json"
+    path.write_text(text)
+    with pytest.raises(InputError, match="expected"):
+        list(read_models(path))
+
+
+@pytest.mark.parametrize("part", ["x", None, [], 10**20])
+def test_a_part_that_is_no_number_is_refused_in_a_sentence(tmp_path, part):
+    write_sample_run(tmp_path)
+    path = run_models(tmp_path)
+    semantics = json.dumps(
+        {"type": "RoofSurface", "hiproof_part": part, "hiproof_part_type": "gable"}
+    )
+    path.write_text(path.read_text().replace('{"type": "RoofSurface"}', semantics))
+    sentence = r"expected building house-1 in line 2 of .* as the number of a part"
+    with pytest.raises(InputError, match=sentence):
+        list(read_models(path))
+
+
+def test_a_missing_file_is_refused(tmp_path):
+    with pytest.raises(InputError, match="expected a readable text file"):
+        list(read_models(tmp_path / "none.json"))

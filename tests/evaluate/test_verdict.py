@@ -4,6 +4,7 @@ it, whatever hides that.
 
 import dataclasses
 import json
+import re
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from hiproof.city.folder.ledger import Ledger
 from hiproof.cli.running import graded_words
 from hiproof.cli.status import describe, read_state
 from hiproof.compose import compose
+from hiproof.evaluate.layers import REACH, find_second_surface, unseen_share
 from hiproof.evaluate.verdict import FEWEST_ON_PART, judge_model
 from hiproof.model import Model
 from hiproof.model.heights import find_highest
@@ -27,27 +29,38 @@ from run_records import run_points
 from tiny_town import make_town
 
 OUTLINE = shapely.box(0.0, 0.0, 12.0, 9.0)
+WALLS = [((12, 0.1, 6), 300), ((0.1, 9, 6), 200)]  # their far corner and how many points
 
 
-def block(height=6.0, outline=OUTLINE):
-    """A flat block over an outline, as a person would write it."""
-    ring = shapely.get_coordinates(outline.exterior)[:-1].tolist()
-    west, south, east, north = outline.bounds
-    sizes = {"width": north - south, "length": east - west}
-    part = {
-        "type": "flat",
-        "parameters": sizes,
-        "position": [(west + east) / 2, (south + north) / 2, height],
-    }
-    record = {"id": "a", "origin": [0, 0, 0], "z_ground": 0, "outline": [ring], "parts": [part]}
+def build_blocks(size, *blocks):
+    """Flat roofs side by side from x to x (m) at a height, over a plan of that size."""
+    ring = shapely.get_coordinates(shapely.box(0, 0, *size).exterior)[:-1].tolist()
+    parts = [
+        {
+            "type": "flat",
+            "parameters": {"width": size[1], "length": east - west},
+            "position": [(west + east) / 2, size[1] / 2, height],
+        }
+        for west, east, height in blocks
+    ]
+    record = {"id": "a", "origin": [0, 0, 0], "z_ground": 0, "outline": [ring], "parts": parts}
     return hiproof.build(record).model
+
+
+def block(height=6.0, size=(12.0, 9.0)):
+    """A flat block over a plan, as a person would write it."""
+    return build_blocks(size, (0.0, size[0], height))
 
 
 def on_block(count=600, height=6.0, seed=0):
     rng = np.random.default_rng(seed)
-    return np.column_stack(
-        [rng.uniform((0, 0), (12, 9), (count, 2)), height + rng.normal(0.0, 0.03, count)]
-    )
+    xy = rng.uniform((0, 0), (12, 9), (count, 2))
+    return np.column_stack([xy, height + rng.normal(0.0, 0.03, count)])
+
+
+def judge(*points):
+    """The verdict on the block by points (n, 3) of several kinds."""
+    return judge_model(block(), np.concatenate(points))
 
 
 def cluster(count, height, centre=(6.0, 5.0), width=2.5):
@@ -75,33 +88,25 @@ def test_a_roof_with_three_fifths_of_all_its_points_off_is_poor(off_m, side):
     """Those off lie near the outline of a narrow building, where a share of inner points does not
     see them.
     """
-    narrow = shapely.box(0.0, 0.0, 12.0, 1.4)
     points = np.random.default_rng(2).uniform((0, 0), (12, 1.4), (400, 2))
     deviation = (np.arange(400) % 5 < 3) * side * off_m
-    verdict = judge_model(block(6.0 + 30.0, narrow), np.column_stack([points, 36.0 + deviation]))
-    assert verdict.grade is Grade.POOR and any(
-        "% of its points lie within 0.2 m" in reason for reason in verdict.reasons
-    )
+    narrow = block(36.0, (12.0, 1.4))
+    verdict = judge_model(narrow, np.column_stack([points, 36.0 + deviation]))
+    assert verdict.grade is Grade.POOR
+    assert any("% of its points lie within 0.2 m" in reason for reason in verdict.reasons)
 
 
 def test_facade_points_say_nothing_of_a_roof():
     along, height = np.random.default_rng(3).uniform((0, 0.5), (12, 5.9), (900, 2)).T
     walls = np.column_stack([along, np.full(900, 0.05), height])
-    assert judge_model(block(), np.concatenate([on_block(), walls])) == (Grade.GOOD, ())
+    assert judge(on_block(), walls) == (Grade.GOOD, ())
 
 
 @pytest.mark.parametrize("with_footprint", [True, False])
 def test_a_building_with_points_on_two_walls_alone_is_poor(with_footprint):
     rng = np.random.default_rng(4)
-    south = np.column_stack(
-        [rng.uniform(0, 12, 300), rng.uniform(0, 0.1, 300), rng.uniform(0, 6, 300)]
-    )
-    west = np.column_stack(
-        [rng.uniform(0, 0.1, 200), rng.uniform(0, 9, 200), rng.uniform(0, 6, 200)]
-    )
-    building = hiproof.reconstruct(
-        np.concatenate([south, west]), OUTLINE if with_footprint else None
-    )
+    south, west = (rng.uniform((0, 0, 0), to, (n, 3)) for to, n in WALLS)
+    building = hiproof.reconstruct(np.vstack([south, west]), OUTLINE if with_footprint else None)
     assert building.grade is Grade.POOR
     assert "follows" not in building.detail and "% of its" in building.detail
 
@@ -109,22 +114,15 @@ def test_a_building_with_points_on_two_walls_alone_is_poor(with_footprint):
 @pytest.mark.parametrize("count", [5, 41, 296])
 @pytest.mark.parametrize("height", [4.0, 30.0])
 def test_points_far_above_a_model_are_named(count, height):
-    verdict = judge_model(
-        block(), np.concatenate([on_block(3000), cluster(count, height, width=1.5)])
-    )
+    verdict = judge(on_block(3000), cluster(count, height, width=1.5))
     assert verdict.grade is not Grade.GOOD
-    assert (
-        f"{count} points up to {height:.{1 if height < 10 else 0}f} m above the model"
-        in verdict.reasons
-    )
+    high = f"{height:.{1 if height < 10 else 0}f}"
+    assert f"{count} points up to {high} m above the model" in verdict.reasons
 
 
 def test_birds_and_a_chimney_do_not_count():
     birds = np.column_stack([np.linspace(1, 11, 6), np.linspace(1, 8, 6), np.full(6, 30.0)])
-    chimney = cluster(20, 1.2, width=0.9)
-    assert (
-        judge_model(block(), np.concatenate([on_block(3000), birds, chimney])).grade is Grade.GOOD
-    )
+    assert judge(on_block(3000), birds, cluster(20, 1.2, width=0.9)).grade is Grade.GOOD
 
 
 def test_points_of_a_courtyard_that_the_outline_lacks_are_named():
@@ -140,14 +138,14 @@ def test_points_of_a_courtyard_that_the_outline_lacks_are_named():
 @pytest.mark.parametrize("off_m", [-2.0, 1.0, 2.5])
 def test_a_place_of_several_square_metres_off_the_roof_is_never_good(side_m, off_m):
     """However large the building is."""
-    outline, good = shapely.box(0, 0, side_m, side_m), []
+    model, good = block(6.0, (side_m, side_m)), []
     for seed in range(10):
         rng = np.random.default_rng(seed)
         xy = rng.uniform(0, side_m, (int(4 * side_m**2), 2))
         middle = rng.uniform(3.0, side_m - 3.0, 2)
         is_off = (abs(xy - middle) < 1.75).all(axis=1)
         points = np.column_stack([xy, 6.0 + is_off * off_m + rng.normal(0, 0.05, len(xy))])
-        good.append(judge_model(block(6.0, outline), points).grade is Grade.GOOD)
+        good.append(judge_model(model, points).grade is Grade.GOOD)
     assert not any(good)
 
 
@@ -157,37 +155,20 @@ def test_the_wall_of_a_taller_neighbour_says_nothing_of_a_roof(count, height):
     """Its points lie over the outline, or a little to either side."""
     rng = np.random.default_rng(8)
     wall = rng.uniform((0, -0.2, 6), (12, 0.2, 6 + height), (count, 3))
-    assert judge_model(block(), np.concatenate([on_block(), wall])) == (Grade.GOOD, ())
+    assert judge(on_block(), wall) == (Grade.GOOD, ())
 
 
 def test_points_outside_the_outline_say_nothing_of_a_roof():
-    beside = on_block() + [13.0, 0.0, 5.0]
-    assert judge_model(block(), np.concatenate([on_block(), beside])) == (Grade.GOOD, ())
+    assert judge(on_block(), on_block() + [13.0, 0.0, 5.0]) == (Grade.GOOD, ())
 
 
 def test_points_over_a_place_that_no_part_covers_lie_above_the_ground_there():
     """A part that could not become a valid solid was left out."""
-    whole = block()
-    left = dataclasses.replace(whole.roof, parts=block(6.0, shapely.box(0, 0, 7, 9)).roof.parts)
+    left = dataclasses.replace(block().roof, parts=block(6.0, (7.0, 9.0)).roof.parts)
     model = Model(left, compose(left, 0.0).move(left.frame.origin))
     verdict = judge_model(model, on_block())
     assert verdict.grade is Grade.POOR
     assert any(reason.endswith("up to 6.1 m above the model") for reason in verdict.reasons)
-
-
-def stepped(step_x, high, size):
-    """A tower and, from `step_x` on, a low roof beside it."""
-    ring = shapely.get_coordinates(shapely.box(0, 0, *size).exterior)[:-1].tolist()
-    parts = [
-        {
-            "type": "flat",
-            "parameters": {"width": size[1], "length": east - west},
-            "position": [(west + east) / 2, size[1] / 2, height],
-        }
-        for west, east, height in [(0.0, step_x, high), (step_x, size[0], 6.0)]
-    ]
-    record = {"id": "a", "origin": [0, 0, 0], "z_ground": 0, "outline": [ring], "parts": parts}
-    return hiproof.build(record).model
 
 
 @pytest.mark.parametrize("high", [9.0, 98.0])
@@ -195,12 +176,12 @@ def stepped(step_x, high, size):
 @pytest.mark.parametrize("width_m", [12.0, 80.0])
 def test_a_tower_that_reaches_over_a_place_without_points_is_not_good(width_m, too_wide_m, high):
     """The place beside the tower holds no points, and the model goes on there at its height."""
-    good, size = [], (width_m + 30.0, 30.0)
-    model = stepped(width_m + too_wide_m, high, size)
+    good, size, step_x = [], (width_m + 30.0, 30.0), width_m + too_wide_m
+    model = build_blocks(size, (0.0, step_x, high), (step_x, size[0], 6.0))
     for seed in range(10):
         rng = np.random.default_rng(seed)
         xy = rng.uniform((0, 0), size, (int(4 * size[0] * size[1]), 2))
-        xy = xy[(xy[:, 0] < width_m) | (xy[:, 0] > width_m + too_wide_m)]
+        xy = xy[(xy[:, 0] < width_m) | (xy[:, 0] > step_x)]
         z = np.where(xy[:, 0] < width_m, high, 6.0) + rng.normal(0, 0.05, len(xy))
         good.append(judge_model(model, np.column_stack([xy, z])).grade is Grade.GOOD)
     assert sum(good) >= 9 if too_wide_m == 0 else not any(good)
@@ -216,10 +197,9 @@ def test_points_off_along_the_outline_alone_do_not_count():
 
 @pytest.mark.parametrize("side_m", [12.0, 120.0])
 def test_a_gentle_slope_under_a_level_roof_is_not_good(side_m):
-    outline = shapely.box(0, 0, side_m, side_m)
     xy = np.random.default_rng(7).uniform(0, side_m, (int(4 * side_m**2), 2))
     points = np.column_stack([xy, 6.0 + 0.3 * (xy[:, 0] / side_m - 0.5)])
-    verdict = judge_model(block(6.0, outline), points)
+    verdict = judge_model(block(6.0, (side_m, side_m)), points)
     assert verdict.grade is Grade.FAIR and "rise another way" in verdict.reasons[0]
 
 
@@ -232,17 +212,11 @@ def test_half_a_building_without_points_is_poor_and_a_tenth_is_not():
 def run_over_spire(folder, code, max_points=20_000):
     """What the run writes of a house over whose middle 60 points of class `code` rise to 30 m."""
     town = make_town(1, density=40.0)
-    west, south, east, north = town.footprints["house-0"].bounds
-    rng = np.random.default_rng(5)
-    spire = np.column_stack(
-        [
-            rng.uniform(-0.6, 0.6, (60, 2)) + ((west + east) / 2, (south + north) / 2),
-            np.linspace(15, 32, 60),
-        ]
-    )
+    middle = shapely.get_coordinates(town.footprints["house-0"].centroid)[0]
+    xy = np.random.default_rng(5).uniform(-0.6, 0.6, (60, 2)) + middle
+    xyz = np.concatenate([town.xyz, np.column_stack([xy, np.linspace(15, 32, 60)])])
     classes = np.append(town.classification, np.full(60, code, np.uint8))
     settings = Settings.from_dict({"city": {"max_points_a_building": max_points}})
-    xyz = np.concatenate([town.xyz, spire])
     rows, summary = run_points(folder, xyz, classes, town.footprints, settings=settings)
     return rows["house-0"], summary
 
@@ -258,3 +232,118 @@ def test_neither_thinning_nor_a_class_of_noise_hides_a_spire(tmp_path, code, max
     assert json.loads((tmp_path / "out" / "run.json").read_text())["by_quality"] == {
         row["quality"]: 1
     }
+
+
+UNMOVED = Settings.from_dict({"reconstruct": {"align": "off"}})
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def compound(seed, density=6.0, noise_m=0.03):
+    """A compound roof, and points (n, 3) on it in its own frame."""
+    roof = random_compound(np.random.default_rng(seed)).roof
+    return roof, sample_heights(
+        lambda x, y: roof.height_at(np.column_stack([x, y])), roof.outline, density, noise_m, seed
+    )
+
+
+@settings(max_examples=40, deadline=None)
+@given(SEEDS, st.floats(2.0, 20.0), st.floats(0.0, 0.3))
+def test_points_of_one_roof_are_one_surface_whatever_their_noise(seed, density, noise_m):
+    roof, points = compound(seed, density, noise_m)
+    assert find_second_surface(points, roof) == (0.0, 0.0)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    SEEDS,
+    st.floats(0.3, 6.0),
+    st.floats(0.35, 0.65),
+    st.sampled_from([-1.0, 1.0]),
+    st.floats(0.0, 1.0),
+)
+def test_a_second_surface_is_seen_wherever_the_model_lies_between_them(
+    seed, apart_m, share, side, model_height
+):
+    roof, points = compound(seed)
+    raised = np.random.default_rng(seed).random(len(points)) < share
+    points[:, 2] += side * apart_m * (raised - model_height)
+    result, distance_m = find_second_surface(points, roof)
+    assert result > 0.4
+    assert distance_m == pytest.approx(apart_m, abs=0.05)
+
+
+@settings(max_examples=20, deadline=None)
+@given(SEEDS, st.floats(0.5, 5.0))
+def test_a_part_that_the_model_lacks_is_no_second_surface(seed, height_m):
+    roof, points = compound(seed)
+    x0, _, x1, _ = roof.outline.bounds
+    points[:, 2] += height_m * (points[:, 0] > x0 + 0.6 * (x1 - x0))
+    assert find_second_surface(points, roof) == (0.0, 0.0)
+
+
+def test_a_building_says_that_its_points_lie_on_two_surfaces():
+    outline = shapely.box(0, 0, 12, 8)
+    points = sample_heights(lambda x, y: 8 - 0.5 * abs(y - 4), outline)
+    assert "two surfaces" not in hiproof.reconstruct(points, outline).detail
+    points[::2, 2] += 0.4
+    detail = hiproof.reconstruct(points, outline).detail
+    (apart_m,) = re.findall(r"points lie on two surfaces, (\S+) m apart", detail)
+    assert float(apart_m) == pytest.approx(0.4, abs=0.03)
+
+
+@settings(max_examples=40, deadline=None)
+@given(SEEDS, st.floats(2.0, 20.0), st.floats(0.5, 0.6))
+def test_a_part_without_points_is_told_of_whatever_their_density(seed, density, cut):
+    roof, points = compound(seed, density)
+    visible = points[points[:, 0] > np.quantile(points[:, 0], cut)]
+    assume(len(visible) >= 30)  # fewer may be near all of a small roof
+    assert 0.2 < unseen_share(visible, roof.outline) < cut + 0.2
+
+
+@pytest.mark.parametrize("density", [2.0, 6.0, 20.0])
+def test_points_everywhere_leave_next_to_nothing_unseen_whatever_their_density(density):
+    roofs = [compound(seed, density) for seed in range(60)]
+    shares = [unseen_share(points, roof.outline) for roof, points in roofs]
+    assert np.mean(shares) < 0.002  # by chance one place in 15,000, more along the outline
+    assert max(shares) < 0.03
+
+
+@settings(max_examples=20, deadline=None)
+@given(SEEDS, st.floats(2.0, 12.0), st.floats(20.0, 150.0), st.floats(4.0, 8.0))
+def test_a_strip_without_points_shows_however_large_the_outline_is(seed, density, side_m, strip_m):
+    points = np.random.default_rng(seed).uniform(0, side_m, (int(density * side_m**2), 2))
+    points = points[points[:, 0] < side_m - strip_m]
+    found_m = side_m * unseen_share(points, shapely.box(0, 0, side_m, side_m))
+    gap_m = side_m / np.sqrt(len(points))  # between points, and between the places that are asked
+    assert strip_m - (REACH + 1.0) * gap_m < found_m < strip_m
+
+
+@settings(max_examples=20, deadline=None)
+@given(SEEDS, st.floats(1.0, 6.0))
+def test_the_share_without_points_is_that_of_all_distances_to_a_fine_grid(seed, density):
+    roof, points = compound(seed, density)
+    visible = points[points[:, 1] < np.quantile(points[:, 1], 0.6)]
+    assume(len(visible) >= 100)  # as many places are asked
+    west, south, east, north = roof.outline.bounds
+    grid = np.stack(np.meshgrid(np.linspace(west, east, 101), np.linspace(south, north, 101)), -1)
+    grid = grid[shapely.intersects_xy(roof.outline, grid[..., 0], grid[..., 1])]
+    gaps = np.array([np.hypot(*(visible[:, :2] - place).T).min() for place in grid])
+    share = np.mean(gaps > REACH * np.sqrt(roof.outline.area / len(visible)))
+    assert unseen_share(visible, roof.outline) == pytest.approx(share, abs=0.1)
+
+
+def test_a_score_of_points_in_a_corner_of_a_large_outline_leaves_the_rest_unseen():
+    points = sample_heights(
+        lambda x, y: np.full(len(x), 5.0), shapely.box(0, 0, 2.5, 2.5), density=3.5
+    )
+    assert 12 <= len(points) < 30
+    assert unseen_share(points, shapely.box(0, 0, 15, 10)) > 0.6
+    assert unseen_share(points, shapely.box(0, 0, 2.5, 2.5)) == 0.0
+
+
+def test_a_building_says_that_half_of_it_has_no_points():
+    outline = shapely.box(0, 0, 12, 8)
+    points = sample_heights(lambda x, y: 8 - 0.5 * abs(y - 4), outline)
+    assert hiproof.reconstruct(points, outline).detail == ""
+    detail = hiproof.reconstruct(points[points[:, 0] < 6], outline, settings=UNMOVED).detail
+    assert "% of its outline hold no points; the roof there is a guess" in detail

@@ -7,9 +7,7 @@ import math
 import numpy as np
 import pytest
 from experiments.cramer_rao import (
-    compute_best_covariance,
     compute_bounds,
-    compute_edge_information,
     compute_height_information,
 )
 
@@ -99,28 +97,3 @@ def test_every_primitive_has_a_bound_that_a_turn_does_not_change(kind):
             assert value == pytest.approx(bounds[name], rel=1e-4, abs=1e-9), name
     for name in ("q0", "along", "across", "width", "length"):
         assert 0 < bounds[name] < 1
-
-
-def test_less_noise_and_more_points_tell_more():
-    primitive, theta = make_theta("hip")
-    base = compute_bounds(primitive, theta, 4.0, 0.1)
-    assert compute_bounds(primitive, theta, 4.0, 0.2)["q0"] > base["q0"]
-    assert compute_bounds(primitive, theta, 8.0, 0.1)["width"] < base["width"] / 1.9
-    assert compute_bounds(primitive, theta, 16.0, 0.1)["q1"] == pytest.approx(
-        base["q1"] / 2, rel=0.1
-    )
-
-
-def test_the_covariance_is_symmetric_and_positive():
-    for kind in EXAMPLES:
-        primitive, theta = make_theta(kind)
-        covariance = compute_best_covariance(primitive, theta, 4.72, 0.1)
-        is_known = np.isfinite(np.diag(covariance))
-        inner = covariance[np.ix_(is_known, is_known)]
-        np.testing.assert_allclose(inner, inner.T, rtol=1e-6, atol=1e-12)
-        assert np.linalg.eigvalsh(inner).min() > 0
-
-
-def test_edges_say_nothing_of_heights():
-    primitive, theta = make_theta("hip")
-    assert not compute_edge_information(primitive, theta, 4.72)[5:].any()

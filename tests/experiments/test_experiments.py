@@ -32,7 +32,7 @@ needs_ransac = pytest.mark.skipif(
 @pytest.fixture
 def few_steps(monkeypatch):
     """The paper's objective is followed for two steps alone: where it leads to is what
-    tests/fit/test_paper.py asks.
+    tests/fit/test_single.py asks.
     """
     monkeypatch.setattr(optimize, "minimize", partial(optimize.minimize, options={"maxiter": 2}))
 

@@ -9,21 +9,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from hiproof.errors import FitError
+from hiproof.geometry.alpha_shape import alpha_shape
 from hiproof.geometry.arrays import (
-    compute_median,
-    copy_row,
-    copy_rows,
     list_distinct,
     sort_order,
     sort_values,
 )
 from hiproof.geometry.components import label_components
-from hiproof.geometry.grid import cell_range, count_cells, number_cells
+from hiproof.geometry.grid import count_cells, number_cells
 from hiproof.geometry.point_grid import PointGrid
 from hiproof.geometry.point_in_polygon import flips
-from hiproof.geometry.rings import ring_normal, ring_normals
+from hiproof.geometry.rings import ring_normal
 from hiproof.geometry.thin import thin_to_grid, without_repeats
-from hiproof.model import Footprint
 
 # few numbers, so that many are equal
 NUMBERS = st.sampled_from([-np.inf, -2.5, -1.0, 0.0, 0.5, 1.0, 3.0, np.inf])
@@ -36,21 +34,6 @@ def test_equal_values_keep_their_order(values):
     assert np.array_equal(list_distinct(values), np.unique(values))
 
 
-@given(values=arrays(float, st.integers(1, 70), elements=st.floats(-1e6, 1e6)))
-def test_the_median_is_numpys(values):
-    assert compute_median(values) == np.median(values)
-
-
-@pytest.mark.parametrize("n", [0, 1, 3])
-def test_rows_beyond_the_copied_ones_stay(n):
-    rows, target = np.arange(2.0 * n).reshape(n, 2), np.full((4, 2), 9.0)
-    copy_rows(target, rows)
-    assert np.array_equal(target[:n], rows) and (target[n:] == 9.0).all()
-    row = np.full(4, 9.0)
-    copy_row(row, np.arange(float(n)))
-    assert np.array_equal(row[:n], np.arange(n)) and (row[n:] == 9.0).all()
-
-
 WHOLE = st.integers(-(10**8), 10**8).map(float) | st.integers(-2, 2).map(float)
 
 
@@ -60,11 +43,6 @@ def test_cells_are_numbered_as_numpy_numbers_rows(cells):
     result, found_number = number_cells(cells)
     assert np.array_equal(result, expected) and np.array_equal(found_number, number.ravel())
     assert count_cells(cells) == len(expected)
-
-
-def test_the_range_of_cells_holds_all_points():
-    xy = np.array([[-0.5, 3.9], [8.0, 4.0]])
-    assert cell_range(xy, 4.0) == ((-1, 0), (4, 2))
 
 
 @pytest.mark.parametrize("points", [0, 1, 7, 3000])
@@ -81,14 +59,10 @@ def test_each_point_is_kept_once_in_its_order(points):
 def test_one_point_a_cell_equals_the_plain_loop(spread, cell_m):
     xyz = np.round(np.random.default_rng(3).uniform(-spread, spread, (400, 3)), 2)
     slow = {}
-    for point in xyz:
-        slow.setdefault((np.floor(point[1] / cell_m), np.floor(point[0] / cell_m)), []).append(
-            point
-        )
-    expected = [
-        [*np.mean(members, axis=0)[:2], np.sort([p[2] for p in members])[(len(members) - 1) // 2]]
-        for _, members in sorted(slow.items())
-    ]
+    for x, y, z in xyz:
+        slow.setdefault((np.floor(y / cell_m), np.floor(x / cell_m)), []).append((x, y, z))
+    cells = [np.array(members) for _, members in sorted(slow.items())]
+    expected = [[*c[:, :2].mean(axis=0), np.sort(c[:, 2])[(len(c) - 1) // 2]] for c in cells]
     assert np.allclose(thin_to_grid(xyz, cell_m), expected, atol=1e-9)
 
 
@@ -106,63 +80,32 @@ def test_components_are_those_of_a_graph_search(links):
         while front:
             node = front.pop()
             expected[node] = number
-            ends = {
-                link_start + other - node
-                for link_start, other in links
-                if node in (link_start, other)
-            }
+            ends = {a + b - node for a, b in links if node in (a, b)}
             front |= {end for end in ends if expected[end] < 0}
     assert result.tolist() == expected.tolist()
 
 
-def test_a_long_chain_in_any_order_is_one_component():
-    chain = np.random.default_rng(0).permutation(5000)
-    assert not label_components(5000, np.stack([chain[:-1], chain[1:]])).any()
-
-
 def some_footprints(seed, count=12):
     rng = np.random.default_rng(seed)
-    hulls = [
-        shapely.MultiPoint(rng.uniform(0, 9, (7, 2)) + rng.uniform(-10, 80, 2)).convex_hull
-        for _ in range(count)
-    ]
+    places = [rng.uniform(0, 9, (7, 2)) + rng.uniform(-10, 80, 2) for _ in range(count)]
     holed = shapely.difference(shapely.box(20, 20, 50, 45), shapely.box(30, 30, 40, 40))
-    return [
-        Footprint(str(i), polygon) for i, polygon in enumerate([*hulls, holed, shapely.Polygon()])
-    ]
+    return [*(shapely.MultiPoint(xy).convex_hull for xy in places), holed, shapely.Polygon()]
 
 
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("offset", [0.0, 1e7])
 def test_the_grid_finds_what_a_plain_test_of_every_point_finds(seed, offset):
-    footprints = some_footprints(seed)
-    xyz = np.random.default_rng(seed).uniform([0, 0, 0], [70, 60, 9], (3000, 3)) + [
-        offset,
-        offset,
-        0,
-    ]
-    footprints = [
-        Footprint(f.id, shapely.transform(f.polygon, lambda xy: xy + offset)) for f in footprints
-    ]
+    xyz = np.random.default_rng(seed).uniform([0, 0, 0], [70, 60, 9], (3000, 3))
+    xyz[:, :2] += offset
     grid = PointGrid(xyz)
-    for footprint in footprints:
-        assert np.array_equal(
-            grid.inside(footprint.polygon),
-            np.flatnonzero(shapely.intersects_xy(footprint.polygon, xyz[:, 0], xyz[:, 1])),
-        )
-    for footprint in footprints:
-        result = grid.find_within(footprint.polygon, 3.0)
-        distance = shapely.distance(footprint.polygon, shapely.points(xyz[:, :2]))
+    for footprint in some_footprints(seed):
+        polygon = shapely.transform(footprint, lambda xy: xy + offset)
+        inside = np.flatnonzero(shapely.intersects_xy(polygon, *xyz[:, :2].T))
+        assert np.array_equal(grid.inside(polygon), inside)
+        distance = shapely.distance(polygon, shapely.points(xyz[:, :2]))
         is_near = np.zeros(len(xyz), bool)
-        is_near[result] = True
+        is_near[grid.find_within(polygon, 3.0)] = True
         assert is_near[distance < 2.9].all() and not is_near[distance > 3.0].any()
-
-
-def test_neighbours_do_not_take_points_from_each_other():
-    xy = np.array([[0.5, 0.5], [1.5, 0.5]])
-    grid = PointGrid(xy)
-    assert grid.inside(shapely.box(0, 0, 2, 1)).tolist() == [0, 1]
-    assert grid.inside(shapely.box(1, 0, 3, 1)).tolist() == [1]
 
 
 def test_no_points_and_no_polygon_find_nothing():
@@ -179,20 +122,16 @@ def test_a_point_is_inside_where_an_odd_number_of_edges_flips(seed):
     """
     rng = np.random.default_rng(seed)
     ring = rng.uniform(-5.0, 5.0, (7, 2))
-    area = shapely.make_valid(shapely.Polygon(ring))
+    area, ends = shapely.make_valid(shapely.Polygon(ring)), np.roll(ring, -1, axis=0)
     for x, y in rng.uniform(-6.0, 6.0, (200, 2)):
-        flipped = sum(
-            flips(*a, *b, x, y) for a, b in zip(ring, np.roll(ring, -1, axis=0), strict=True)
-        )
+        flipped = sum(flips(*a, *b, x, y) for a, b in zip(ring, ends, strict=True))
         assert bool(flipped % 2) == shapely.contains_xy(area, x, y)
 
 
 def test_a_normal_is_as_long_as_its_ring_is_large_and_turns_with_it():
-    rng = np.random.default_rng(0)
-    ring = np.column_stack(
-        [shapely.get_coordinates(shapely.box(3.0, 4.0, 8.0, 6.0))[:-1], np.full(4, 7.0)]
-    )
-    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    corners = shapely.get_coordinates(shapely.box(3.0, 4.0, 8.0, 6.0))[:-1]
+    ring = np.column_stack([corners, np.full(4, 7.0)])
+    turn = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
     turn *= np.sign(np.linalg.det(turn))
     assert ring_normal(ring[::-1]) == pytest.approx(-ring_normal(ring))
     assert ring_normal(ring + 1e6) == pytest.approx(ring_normal(ring), abs=1e-6)
@@ -200,9 +139,63 @@ def test_a_normal_is_as_long_as_its_ring_is_large_and_turns_with_it():
     assert np.linalg.norm(ring_normal(ring)) == pytest.approx(10.0)
 
 
-def test_many_normals_are_each_rings_own():
-    rng = np.random.default_rng(1)
-    rings = [rng.normal(size=(count, 3)) for count in (3, 4, 7, 3)]
-    np.testing.assert_allclose(
-        ring_normals(rings), [ring_normal(ring) for ring in rings], atol=1e-12
-    )
+def slow_alpha_area(xy, radius):
+    """Area of the Delaunay triangles whose circumcircle, drawn through their corners, is smaller
+    than `radius`.
+    """
+    area = 0.0
+    for triangle in shapely.get_parts(shapely.delaunay_triangles(shapely.MultiPoint(xy))):
+        corners = np.array(triangle.exterior.coords)[:3]
+        system = 2 * (corners[1:] - corners[0])
+        centre = np.linalg.solve(system, (corners[1:] ** 2).sum(1) - (corners[0] ** 2).sum())
+        if np.linalg.norm(centre - corners[0]) < radius:
+            area += triangle.area
+    return area
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_equals_the_slow_oracle(seed):
+    xy = np.random.default_rng(seed).uniform(0, 10, (200, 2))
+    shape = alpha_shape(xy, 2.0)
+    assert shape.area == pytest.approx(slow_alpha_area(xy, 2.0), rel=1e-9)
+
+
+def test_the_larger_of_two_houses():
+    rng = np.random.default_rng(0)
+    xy = np.concatenate([rng.uniform(0, 10, (300, 2)), rng.uniform(20, 24, (80, 2))])
+    assert 80 < alpha_shape(xy, 2.0).area < 100
+
+
+@pytest.mark.parametrize(
+    "xy",
+    [np.zeros((1, 2)), np.zeros((5, 2)), np.ones((2, 1)) * [[1.0, 2]], np.full((4, 2), np.nan)],
+)
+def test_points_without_area_are_refused(xy):
+    with pytest.raises(FitError, match="span an area"):
+        alpha_shape(xy)
+
+
+def test_a_radius_below_every_spacing_is_refused():
+    with pytest.raises(FitError, match="larger"):
+        alpha_shape(np.array([[0.0, 0], [1, 0], [0, 1], [1, 1]]), 0.01)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_shape_is_the_same_far_from_the_origin(seed):
+    """At a national grid's coordinates, where doubles have steps of a nanometre."""
+    xy = np.random.default_rng(seed).uniform(0.0, 12.0, (600, 2)).round(3)
+    distant_origin = np.array([390_123.0, 5_656_789.0])
+    first = alpha_shape(xy)
+    second = shapely.transform(alpha_shape(xy + distant_origin), lambda c: c - distant_origin)
+    assert second.area == pytest.approx(first.area, rel=1e-6)
+    assert second.hausdorff_distance(first) < 1e-6
+
+
+@pytest.mark.parametrize("holes", [True, False])
+def test_a_court_is_kept_or_filled(holes):
+    axis = np.arange(0, 10.1, 0.5)
+    xy = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
+    shape = alpha_shape(xy[np.abs(xy - 5.0).max(axis=1) > 2.4], 1.0, holes=holes)
+    assert len(shape.interiors) == holes
+    # corners of the court are rounded off
+    assert shape.area == pytest.approx(100 - 25 * holes, abs=2.5)

@@ -15,7 +15,7 @@ from hiproof.city.work.solve import make_outcome
 from hiproof.compose import compose
 from hiproof.evaluate.models import read_models
 from hiproof.frames import LocalFrame
-from hiproof.model import Building, Model, Part, Piece, Roof, shown
+from hiproof.model import Building, Model, Part, Piece, Roof
 from hiproof.model.heights import find_highest
 from hiproof.model.roof_figures import roof_figures
 from hiproof.model.shown import share_surface
@@ -26,6 +26,13 @@ from roof_zoo import FRAME, KINDS, generate_roof
 from written_run import write_all
 
 SNAPPED_M = 0.05  # composing moves edges by less than this
+
+
+def make_slopes():
+    """A gable of 9 by 5 m, its eaves at 4 m."""
+    slopes = np.array([[0.0, 0.4, 4.0], [0.0, -0.4, 6.0]])
+    size = {"width": 5.0, "length": 9.0, "height": 1.0}
+    return Part("gable", (Piece(shapely.box(0, 0, 9, 5), slopes),), size)
 
 
 def compose_building(roof):
@@ -67,34 +74,22 @@ def test_where_a_part_shows_none_is_higher(kind, seed):
 
 
 def test_parts_in_one_plane_share_a_surface_by_their_outlines():
-    roof = Roof(
-        (flat(3.0, 0, 0, 6, 5), flat(3.0, 6, 0, 10, 5), flat(2.0, 1, 1, 2, 2)),
-        shapely.box(0, 0, 10, 5),
-        FRAME,
-    )
-    building = compose_building(roof)
+    parts = (flat(3.0, 0, 0, 6, 5), flat(3.0, 6, 0, 10, 5), flat(2.0, 1, 1, 2, 2))
+    building = compose_building(Roof(parts, shapely.box(0, 0, 10, 5), FRAME))
     assert len(building.solid.select_faces("RoofSurface")) == 1
-    assert [area.area for area in building.compute_visible_areas()] == pytest.approx(
-        [30.0, 20.0, 0.0]
-    )
+    areas = [area.area for area in building.compute_visible_areas()]
+    assert areas == pytest.approx([30.0, 20.0, 0.0])
 
 
 def test_a_building_is_of_the_type_that_shows_most_in_every_output(tmp_path):
     """The flat part is drawn over 60 m2, of which the gable hides 45; the gable is drawn over, and
     shows, 45.
     """
-    slopes = np.array([[0.0, 0.4, 4.0], [0.0, -0.4, 6.0]])
-    gable = Part(
-        "gable",
-        (Piece(shapely.box(0, 0, 9, 5), slopes),),
-        {"width": 5.0, "length": 9.0, "height": 1.0},
-    )
-    hidden = flat(3.0, 2, 1, 8, 4)
-    roof = Roof((flat(2.5, 0, 0, 12, 5), gable, hidden), shapely.box(0, 0, 12, 5), FRAME)
+    parts = (flat(2.5, 0, 0, 12, 5), make_slopes(), flat(3.0, 2, 1, 8, 4))
+    roof = Roof(parts, shapely.box(0, 0, 12, 5), FRAME)
     building = replace(compose_building(roof), z_ground=0.0)
-    assert building.type == "gable" and building.model.visible_m2 == pytest.approx(
-        (15.0, 45.0, 0.0)
-    )
+    assert building.type == "gable"
+    assert building.model.visible_m2 == pytest.approx((15.0, 45.0, 0.0))
     write_all(tmp_path, [building])
     (model,) = read_models(tmp_path / "buildings.city.jsonl")
     assert model.roof_type == "gable"
@@ -107,13 +102,8 @@ def test_a_building_is_of_the_type_that_shows_most_in_every_output(tmp_path):
 
 
 def test_hidden_parts_do_not_make_a_roof_a_mixed_one(tmp_path):
-    gable = Part(
-        "gable", (Piece(shapely.box(0, 0, 9, 5), np.array([[0.0, 0.4, 4.0], [0.0, -0.4, 6.0]])),)
-    )
-    building = compose_building(
-        Roof((flat(3.0, 2, 1, 8, 4), gable), shapely.box(0, 0, 9, 5), FRAME)
-    )
-    write_all(tmp_path, [replace(building, z_ground=0.0)])
+    roof = Roof((flat(3.0, 2, 1, 8, 4), make_slopes()), shapely.box(0, 0, 9, 5), FRAME)
+    write_all(tmp_path, [replace(compose_building(roof), z_ground=0.0)])
     assert "1030</bldg:roofType>" in (tmp_path / "buildings.gml").read_text()
 
 
@@ -121,10 +111,8 @@ def test_rows_hold_where_a_part_shows_and_its_size_and_a_hidden_one_has_none():
     roof = Roof((flat(3.0, -5, -5, 20, 20), flat(2.0, 1, 1, 2, 2)), shapely.box(0, 0, 10, 5), FRAME)
     ((geometry, values),) = part_rows(compose_building(roof))
     x, y, _ = RD_ORIGIN
-    assert (
-        shapely.from_wkb(geometry).equals(shapely.box(x, y, x + 10, y + 5))
-        and values["area_m2"] == 50.0
-    )
+    assert shapely.from_wkb(geometry).equals(shapely.box(x, y, x + 10, y + 5))
+    assert values["area_m2"] == 50.0
 
 
 def test_a_small_surface_stays_with_its_part_where_no_other_is_drawn():
@@ -134,37 +122,23 @@ def test_a_small_surface_stays_with_its_part_where_no_other_is_drawn():
 
 
 def test_what_shrinks_to_a_line_on_the_grid_is_no_area():
-    area = shapely.Polygon(
-        [
-            (-4.72, 0.253),
-            (-2.038, 2),
-            (-2.221, 1.864),
-            (-1.357, 0.634),
-            (-3.735, -1.053),
-            (-4.604, 0.098),
-        ]
-    )
+    ring = [(-2.221, 1.864), (-1.357, 0.634), (-3.735, -1.053), (-4.604, 0.098)]
+    area = shapely.Polygon([(-4.72, 0.253), (-2.038, 2), *ring])
     members = shapely.Polygon([(-2.039, 1.999), (-4.604, 0.098), (-4.72, 0.253)])
-    other = shapely.Polygon([(-2.221, 1.864), (-1.357, 0.634), (-3.735, -1.053), (-4.604, 0.098)])
-    remaining, remainder = share_surface(area, members, other)
+    remaining, remainder = share_surface(area, members, shapely.Polygon(ring))
     assert {remaining.geom_type, remainder.geom_type} == {"MultiPolygon"}
     assert remaining.area + remainder.area == pytest.approx(area.area, abs=1e-2)
 
 
 @pytest.mark.parametrize("seed", range(20))
 def test_parts_in_one_plane_whose_outlines_miss_one_another_leave_no_slivers(seed):
-    rng = np.random.default_rng(seed)
-    first = affinity.rotate(shapely.box(0, 0, 6, 5), 30)
-    second = affinity.rotate(shapely.box(6, 0, 10, 5), 30, (3, 2.5))
-    boxes = [
-        shapely.set_precision(affinity.rotate(box, rng.uniform(-0.02, 0.02)), 1e-4)
-        for box in (first, second)
-    ]
-    parts = tuple(Part("flat", (Piece(box, np.array([[0.0, 0.0, 3.0]])),)) for box in boxes)
-    building = compose_building(
-        Roof(parts, affinity.rotate(shapely.box(0, 0, 10, 5), 30, (3, 2.5)), FRAME)
-    )
-    areas = building.compute_visible_areas()
+    rng, parts = np.random.default_rng(seed), []
+    for x0, x1 in ((0, 6), (6, 10)):
+        box = affinity.rotate(shapely.box(x0, 0, x1, 5), 30, (3, 2.5))
+        box = shapely.set_precision(affinity.rotate(box, rng.uniform(-0.02, 0.02)), 1e-4)
+        parts.append(Part("flat", (Piece(box, np.array([[0.0, 0.0, 3.0]])),)))
+    outline = affinity.rotate(shapely.box(0, 0, 10, 5), 30, (3, 2.5))
+    areas = compose_building(Roof(tuple(parts), outline, FRAME)).compute_visible_areas()
     assert shapely.is_valid(areas).all() and {area.geom_type for area in areas} == {"Polygon"}
     assert [area.area for area in areas] == pytest.approx([30.0, 20.0], abs=0.1)
 
@@ -183,19 +157,6 @@ def test_a_part_around_a_yard_has_a_hole():
 
 def test_a_building_without_a_model_shows_nothing():
     assert make_lost_building().compute_visible_areas() == []
-
-
-def test_the_visible_pieces_of_a_model_are_computed_once(monkeypatch):
-    """Its verdict, its attributes and its tables ask for them."""
-    building, calls = make_building(courtyard(), kinds=("flat",)), []
-    compute = shown.compute_visible_pieces
-    monkeypatch.setattr(
-        "hiproof.model.building.compute_visible_pieces",
-        lambda *given: calls.append(given) or compute(*given),
-    )
-    (area,) = building.compute_visible_areas()
-    assert building.model.visible_m2 == (pytest.approx(area.area),)
-    assert building.compute_visible_areas() and len(calls) == 1
 
 
 def test_the_highest_part_is_found_at_every_point():

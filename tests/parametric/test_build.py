@@ -84,9 +84,8 @@ def demo_run(tmp_path_factory):
 
 def test_a_runs_own_parameters_give_its_own_files(demo_run, tmp_path):
     built = build_file(demo_run / "parameters.jsonl", tmp_path)
-    assert built.exit_code == 0 and built.buildings == len(
-        hiproof.read_parameters(demo_run / "parameters.jsonl")
-    )
+    assert built.exit_code == 0
+    assert built.buildings == len(hiproof.read_parameters(demo_run / "parameters.jsonl"))
     for name in (*FILES, *PARQUET):
         assert (tmp_path / name).read_bytes() == (demo_run / name).read_bytes(), name
 

@@ -1,6 +1,4 @@
-"""Every feature of a footprint file comes back: split, repaired, renamed or empty, but
-never lost.
-"""
+"""Every feature of a footprint file comes back: split, repaired, renamed or empty, never lost."""
 
 import json
 
@@ -13,7 +11,7 @@ from pyproj import CRS, Transformer
 from hiproof.city.plan.overlap import check_overlap
 from hiproof.errors import InputError, InputWarning
 from hiproof.model import Footprint
-from hiproof.read.crs.positions import doubtful_place, refuse_degrees
+from hiproof.read.crs.positions import doubtful_place
 from hiproof.read.outlines.footprints import footprint_crs, read_footprints
 from hiproof.read.outlines.polygons import simple_polygons
 from hiproof.settings import Settings
@@ -30,19 +28,8 @@ HOLED = shapely.Polygon(
 
 
 def write(path, geometries, crs="EPSG:28992", **fields):
-    wkb = np.array(
-        [None if g is None else shapely.to_wkb(g, output_dimension=3) for g in geometries], object
-    )
-    pyogrio.raw.write(
-        str(path),
-        wkb,
-        [np.asarray(values) for values in fields.values()],
-        list(fields),
-        geometry_type="Unknown",
-        crs=crs,
-        layer=None if path.suffix != ".gpkg" else "buildings",
-    )
-    return path
+    layer = {"layer": "buildings"} if path.suffix == ".gpkg" else {}
+    return write_layer(path, geometries, fields, crs, geometry_type="Unknown", **layer)
 
 
 def shift(polygon, x):
@@ -51,24 +38,15 @@ def shift(polygon, x):
 
 @pytest.mark.parametrize("ending", ["gpkg", "geojson", "fgb"])
 def test_polygons_holes_and_attributes_come_back(tmp_path, ending):
-    path = write(
-        tmp_path / f"a.{ending}",
-        [SQUARE, shift(HOLED, 20)],
-        name=np.array(["A", "B"], object),
-        floors=np.array([2, 3], np.int32),
-        height=np.array([7.5, np.nan]),
-        built=np.array(["1931-05-17", "2001-01-01"], "datetime64[D]"),
-    )
+    fields = {"name": ["A", "B"], "floors": np.array([2, 3], np.int32), "height": [7.5, np.nan]}
+    fields |= {"built": np.array(["1931-05-17", "2001-01-01"], "datetime64[D]")}
+    path = write(tmp_path / f"a.{ending}", [SQUARE, shift(HOLED, 20)], **fields)
     # FlatGeobuf reorders
     first, second = sorted(read_footprints(path, id_attribute="name"), key=lambda f: f.id)
     assert (first.id, second.id) == ("A", "B")
     assert first.polygon.equals(SQUARE) and second.polygon.equals(shift(HOLED, 20))
-    built = first.attributes.pop("built")
-    assert built.startswith("1931-05-17") and first.attributes == {
-        "name": "A",
-        "floors": 2,
-        "height": 7.5,
-    }
+    assert first.attributes.pop("built").startswith("1931-05-17")
+    assert first.attributes == {"name": "A", "floors": 2, "height": 7.5}
     assert "height" not in second.attributes
     json.dumps(second.attributes)
 
@@ -80,9 +58,8 @@ def test_which_way_rings_go_round_depends_on_no_format(tmp_path, ending):
     """
     path = write(tmp_path / f"a.{ending}", [SQUARE, shapely.reverse(SQUARE), shift(HOLED, 20)])
     for footprint in read_footprints(path):
-        assert not footprint.polygon.exterior.is_ccw and all(
-            hole.is_ccw for hole in footprint.polygon.interiors
-        )
+        assert not footprint.polygon.exterior.is_ccw
+        assert all(hole.is_ccw for hole in footprint.polygon.interiors)
 
 
 def write_with_gaps(path, **fields):
@@ -95,39 +72,22 @@ def write_with_gaps(path, **fields):
 @pytest.mark.parametrize("ending", ["gpkg", "geojson", "fgb"])
 @pytest.mark.parametrize("condition", [None, "name <> 'D' or name = 'E'"])
 def test_whole_numbers_and_booleans_stay_so_where_a_feature_has_none(tmp_path, ending, condition):
-    """They became decimals: a year 1931.0, a yes 1.0, and an id beyond 2^53 that of its
-    neighbour.
-    """
-    path = write_with_gaps(
-        tmp_path / f"a.{ending}",
-        year=np.array([1931, 0, 2001], np.int32),
-        listed=np.array([True, False, False]),
-        number=2**53 + np.array([1, 0, 3], np.int64),
-        height=np.array([7.5, 0, 8.0]),
-    )
-    by_name = {
-        f.id: f.attributes for f in read_footprints(path, id_attribute="name", where=condition)
+    """They became decimals: a year 1931.0, a yes 1.0, an id beyond 2^53 that of its neighbour."""
+    fields = {
+        "year": np.array([1931, 0, 2001], np.int32),
+        "listed": np.array([True, False, False]),
+        "number": 2**53 + np.array([1, 0, 3], np.int64),
+        "height": np.array([7.5, 0, 8.0]),
     }
+    path = write_with_gaps(tmp_path / f"a.{ending}", **fields)
+    found = read_footprints(path, id_attribute="name", where=condition)
+    by_name = {f.id: f.attributes for f in found}
     assert by_name["B"] == {"name": "B"}
-    assert [by_name["A"][k] for k in ("year", "listed", "number", "height")] == [
-        1931,
-        True,
-        2**53 + 1,
-        7.5,
-    ]
-    assert [by_name["C"][k] for k in ("year", "listed", "number", "height")] == [
-        2001,
-        False,
-        2**53 + 3,
-        8.0,
-    ]
-    for attributes in (by_name["A"], by_name["C"]):
-        assert [type(attributes[k]) for k in ("year", "listed", "number", "height")] == [
-            int,
-            bool,
-            int,
-            float,
-        ]
+    for number, name in ((0, "A"), (2, "C")):
+        for field, values in fields.items():
+            expected = values[number].item()
+            assert by_name[name][field] == expected
+            assert type(by_name[name][field]) is type(expected)
 
 
 def test_ids_of_many_digits_stay_apart_where_a_feature_has_none(tmp_path):
@@ -154,15 +114,11 @@ def test_heights_of_the_outline_are_left_out(tmp_path):
 
 def test_multipolygons_are_split_and_name_their_feature(tmp_path):
     polygons = shapely.MultiPolygon([SQUARE, shift(HOLED, 20)])
-    path = write(
-        tmp_path / "a.gpkg", [polygons, shift(SQUARE, 60)], id=np.array(["M", "N"], object)
-    )
+    path = write(tmp_path / "a.gpkg", [polygons, shift(SQUARE, 60)], id=["M", "N"])
     footprints = read_footprints(path)
     assert [f.id for f in footprints] == ["M-1", "M-2", "N"]
-    assert (
-        footprints[1].attributes == {"id": "M", "part_of": "M"}
-        and "part_of" not in footprints[2].attributes
-    )
+    assert footprints[1].attributes == {"id": "M", "part_of": "M"}
+    assert "part_of" not in footprints[2].attributes
     assert sum(f.polygon.area for f in footprints[:2]) == pytest.approx(polygons.area)
 
 
@@ -190,38 +146,25 @@ def test_footprints_without_a_crs_are_taken_to_be_in_the_clouds(tmp_path):
 
 
 def test_ids_come_from_a_usual_attribute_without_gaps_or_repeats(tmp_path):
-    twins = np.array(["x", "x"], object)
-    geometries = [SQUARE, shift(SQUARE, 20)]
-    path = write(tmp_path / "a.gpkg", geometries, id=twins, Identificatie=np.array([7.0, 9.0]))
+    geometries, twins = [SQUARE, shift(SQUARE, 20)], ["x", "x"]
+    path = write(tmp_path / "a.gpkg", geometries, id=twins, Identificatie=[7.0, 9.0])
     assert [f.id for f in read_footprints(path)] == ["7", "9"]
-    for name, ids in (
-        ("b", twins),
-        ("c", np.array(["x", " "], object)),
-        ("d", np.array([None, "x"], object)),
-    ):
+    remark = "id repeats or is missing, so buildings go by their number"
+    for name, ids in (("b", twins), ("c", ["x", " "]), ("d", [None, "x"])):
         path = write(tmp_path / f"{name}.gpkg", geometries, id=ids)
-        with pytest.warns(
-            InputWarning, match="id repeats or is missing, so buildings go by their number"
-        ):
+        with pytest.warns(InputWarning, match=remark):
             assert [f.id for f in read_footprints(path)] == ["1", "2"]
 
 
 def test_repeated_ids_get_a_suffix_and_copies_name_their_original(tmp_path):
-    path = write(
-        tmp_path / "a.gpkg",
-        [SQUARE, SQUARE.reverse(), shift(SQUARE, 20)],
-        k=np.array(["x", "x", "x_2"], object),
-    )
+    shapes = [SQUARE, SQUARE.reverse(), shift(SQUARE, 20)]
+    path = write(tmp_path / "a.gpkg", shapes, k=["x", "x", "x_2"])
     with pytest.warns(InputWarning) as caught:
         footprints = read_footprints(path, id_attribute="k")
     assert [f.id for f in footprints] == ["x", "x_3", "x_2"]
     assert footprints[1].attributes["copy_of"] == "x" and "copy_of" not in footprints[2].attributes
-    assert {"id of an earlier", "polygon of another"} <= {
-        part
-        for w in caught
-        for part in ("id of an earlier", "polygon of another")
-        if part in str(w.message)
-    }
+    remarks = " ".join(str(w.message) for w in caught)
+    assert "id of an earlier" in remarks and "polygon of another" in remarks
 
 
 def test_a_footprint_on_top_of_another_is_told_of_and_neighbours_and_courts_are_not(
@@ -231,50 +174,40 @@ def test_a_footprint_on_top_of_another_is_told_of_and_neighbours_and_courts_are_
     separate = [SQUARE, shift(SQUARE, np.ptp(SQUARE.bounds[::2])), ring, shift(SQUARE, 50)]
     read_footprints(write(tmp_path / "a.gpkg", separate))
     assert not recwarn.list
-    ids = np.array(["house", "annex", "block"], object)
+    ids = ["house", "annex", "block"]
     path = write(tmp_path / "b.gpkg", [SQUARE, SQUARE.buffer(-2), shift(SQUARE, 20)], id=ids)
-    with pytest.warns(
-        InputWarning, match=r"1 footprint on top of a larger one \(annex on house\): models of both"
-    ):
+    remark = r"1 footprint on top of a larger one \(annex on house\): models of both"
+    with pytest.warns(InputWarning, match=remark):
         assert len(read_footprints(path)) == 3
 
 
 def test_features_without_area_stay_with_an_empty_polygon(tmp_path):
     line = shapely.Polygon([(0, 0), (5, 5), (2, 2), (0, 0)])
-    path = write(
-        tmp_path / "a.gpkg",
-        [SQUARE, line, None, shapely.Point(1, 1)],
-        id=np.array(["a", "b", "c", "d"], object),
-    )
+    shapes = [SQUARE, line, None, shapely.Point(1, 1)]
+    path = write(tmp_path / "a.gpkg", shapes, id=["a", "b", "c", "d"])
     with pytest.warns(InputWarning, match="3 features with no area"):
         footprints = read_footprints(path)
-    assert [(f.id, f.polygon.is_empty) for f in footprints] == [
-        ("a", False),
-        ("b", True),
-        ("c", True),
-        ("d", True),
-    ]
+    assert [f.id for f in footprints] == ["a", "b", "c", "d"]
+    assert [f.polygon.is_empty for f in footprints] == [False, True, True, True]
 
 
 def test_self_intersecting_footprints_are_repaired(tmp_path):
     bow_tie = shapely.Polygon([(0, 0), (8, 8), (8, 0), (0, 8)])
     spike = shapely.Polygon([(20, 0), (30, 0), (30, 10), (30, 15), (30, 10), (20, 10)])
-    path = write(tmp_path / "a.gpkg", [bow_tie, spike], id=np.array(["tie", "spike"], object))
+    path = write(tmp_path / "a.gpkg", [bow_tie, spike], id=["tie", "spike"])
     with pytest.warns(InputWarning, match="2 invalid footprints repaired"):
         footprints = read_footprints(path)
     assert [f.id for f in footprints] == ["tie-1", "tie-2", "spike"]
-    assert all(f.polygon.is_valid for f in footprints) and footprints[
-        2
-    ].polygon.area == pytest.approx(100)
+    assert all(f.polygon.is_valid for f in footprints)
+    assert footprints[2].polygon.area == pytest.approx(100)
 
 
 @pytest.mark.parametrize("seed", range(20))
 def test_any_tangle_of_edges_becomes_valid_polygons(seed):
     rng = np.random.default_rng(seed)
-    for polygon in simple_polygons(shapely.Polygon(rng.uniform(0, 10, (rng.integers(3, 12), 2)))):
-        assert polygon.is_empty or (
-            polygon.is_valid and polygon.geom_type == "Polygon" and polygon.area > 0
-        )
+    tangle = shapely.Polygon(rng.uniform(0, 10, (rng.integers(3, 12), 2)))
+    for polygon in (p for p in simple_polygons(tangle) if not p.is_empty):
+        assert polygon.is_valid and polygon.geom_type == "Polygon" and polygon.area > 0
 
 
 def test_coordinates_that_are_no_numbers_enclose_no_area():
@@ -283,44 +216,29 @@ def test_coordinates_that_are_no_numbers_enclose_no_area():
 
 
 def test_a_file_of_several_layers_needs_a_name(tmp_path):
-    path = write(tmp_path / "a.gpkg", [SQUARE], name=np.array(["A"], object))
+    path = write(tmp_path / "a.gpkg", [SQUARE], name=["A"])
     squares = [shift(SQUARE, 20), shift(SQUARE, 40)]
     write_layer(path, squares, {"name": ["B", "C"]}, layer="sheds", append=True)
     for read in (read_footprints, footprint_crs):
         with pytest.raises(InputError, match="2: buildings, sheds; name one with --layer"):
             read(path)
-    assert (
-        len(read_footprints(path, layer="sheds")) == 2
-        and footprint_crs(path, "buildings").to_epsg() == 28992
-    )
+    assert len(read_footprints(path, layer="sheds")) == 2
+    assert footprint_crs(path, "buildings").to_epsg() == 28992
 
 
 def test_a_table_without_geometry_is_no_layer_to_choose_from(tmp_path):
-    path = write(tmp_path / "a.gpkg", [SQUARE], name=np.array(["A"], object))
-    pyogrio.raw.write(
-        path,
-        None,
-        [np.array(["x"], object)],
-        ["note"],
-        layer="notes",
-        geometry_type=None,
-        append=True,
-    )
+    path = write(tmp_path / "a.gpkg", [SQUARE], name=["A"])
+    notes, options = [np.array(["x"], object)], {"geometry_type": None, "append": True}
+    pyogrio.raw.write(path, None, notes, ["note"], layer="notes", **options)
     assert len(pyogrio.list_layers(path)) == 2 and len(read_footprints(path)) == 1
 
 
 def test_features_of_several_polygons_are_said_once(tmp_path):
     polygons = shapely.MultiPolygon([SQUARE, shift(SQUARE, 20)])
-    with pytest.warns(
-        InputWarning, match="2 features of several polygons became 4 buildings"
-    ) as remarks:
-        read_footprints(
-            write(
-                tmp_path / "a.gpkg",
-                [polygons, shift(polygons, 60)],
-                id=np.array(["M", "N"], object),
-            )
-        )
+    path = write(tmp_path / "a.gpkg", [polygons, shift(polygons, 60)], id=["M", "N"])
+    remark = "2 features of several polygons became 4 buildings"
+    with pytest.warns(InputWarning, match=remark) as remarks:
+        read_footprints(path)
     assert len(remarks) == 1
 
 
@@ -330,40 +248,23 @@ def reproject(xy, source, target):
 
 HERE = np.array([[85005.0, 446005.0], [85035.0, 446005.0]])
 IN_UTM = reproject(HERE, RD, UTM31)
+NEXT_ZONE, DEGREES = reproject(IN_UTM, UTM31, UTM32), reproject(HERE, RD, WGS84)
+
+
+ZONE_32 = r"they look like EPSG:25832 \(ETRS89 / UTM zone 32N\)"
+
+
+LAT_FIRST = "latitude and longitude in degrees"
 SLIPS = {
     "swapped axes": (HERE[:, ::-1], RD, HERE, RD, "x and y look swapped"),
     "swapped axes of an unknown CRS": (HERE[:, ::-1], None, HERE, None, "x and y look swapped"),
-    "degrees": (reproject(HERE, RD, WGS84), None, HERE, RD, "longitude and latitude in degrees"),
-    "degrees, latitude first": (
-        reproject(HERE, RD, WGS84)[:, ::-1],
-        None,
-        HERE,
-        RD,
-        "latitude and longitude in degrees",
-    ),
-    "a cloud in degrees": (
-        HERE,
-        RD,
-        reproject(HERE, RD, WGS84),
-        None,
-        "the cloud looks like longitude and latitude",
-    ),
+    "degrees": (DEGREES, None, HERE, RD, "longitude and latitude in degrees"),
+    "degrees, latitude first": (DEGREES[:, ::-1], None, HERE, RD, LAT_FIRST),
+    "a cloud in degrees": (HERE, RD, DEGREES, None, "the cloud looks like longitude and latitude"),
     "the wrong label": (HERE, UTM31, HERE, RD, "look like the cloud's EPSG:28992"),
     "a neighbouring zone": (IN_UTM, UTM32, IN_UTM, UTM31, "look like the cloud's EPSG:25831"),
-    "two zones off": (
-        reproject(IN_UTM, UTM31, UTM32),
-        None,
-        IN_UTM,
-        UTM31,
-        r"they look like EPSG:25832 \(ETRS89 / UTM zone 32N\)",
-    ),
-    "a cloud in the next zone": (
-        IN_UTM,
-        UTM31,
-        reproject(IN_UTM, UTM31, UTM32),
-        None,
-        "the cloud looks like EPSG:25832",
-    ),
+    "two zones off": (NEXT_ZONE, None, IN_UTM, UTM31, ZONE_32),
+    "a cloud in the next zone": (IN_UTM, UTM31, NEXT_ZONE, None, "the cloud looks like EPSG:25832"),
     "a cloud in the UTM zone": (HERE, RD, IN_UTM, None, "the cloud looks like EPSG:25831"),
     "feet": (HERE / 0.3048, None, HERE, None, "they look like feet"),
     "a cloud in feet": (HERE, None, HERE / 0.3048, None, "the cloud like feet"),
@@ -375,9 +276,8 @@ SLIPS = {
 def test_footprints_elsewhere_are_refused_with_what_they_look_like(slip):
     xy, source, cloud_xy, cloud, expected = SLIPS[slip]
     in_use = xy if source is None or cloud is None else reproject(xy, source, cloud)
-    footprints = [
-        Footprint(str(i), shapely.Point(point).buffer(1e-3)) for i, point in enumerate(in_use)
-    ]
+    shapes = shapely.buffer(shapely.points(in_use), 1e-3)
+    footprints = [Footprint(str(i), shape) for i, shape in enumerate(shapes)]
     reach = 1e-5 if np.abs(cloud_xy).max() < 180 else 20.0
     bounds = (*(cloud_xy.min(axis=0) - reach), *(cloud_xy.max(axis=0) + reach))
     with pytest.raises(InputError, match=expected) as caught:
@@ -404,23 +304,9 @@ def test_coordinates_far_from_where_their_crs_is_used_are_told(code, xy, expecte
 @pytest.mark.parametrize("crs", [None, "EPSG:28992"])
 def test_footprints_in_degrees_that_name_another_crs_are_refused(crs, tmp_path):
     path = write(tmp_path / "a.gpkg", [shapely.box(4.36, 51.99, 4.3602, 51.9901)], crs)
-    with pytest.raises(
-        InputError,
-        match=r"a\.gpkg, which names .*, in metres, got .* look like degrees; name their CRS",
-    ):
+    sentence = r"a\.gpkg, which names .*, in metres, got .* look like degrees; name their CRS"
+    with pytest.raises(InputError, match=sentence):
         read_footprints(path, target_crs=RD)
-
-
-def test_what_names_no_crs_and_counts_in_degrees_is_refused():
-    degrees = np.array([[4.36, 52.0], [4.37, 52.01]])
-    with pytest.raises(
-        InputError,
-        match=r"got coordinates in x 4\.36000 to 4\.38000.* look like degrees; reproject",
-    ):
-        refuse_degrees(np.hstack([degrees, degrees + 0.01]), "the point clouds", "reproject")
-    refuse_degrees(np.hstack([degrees, degrees + 12.0]), "the point clouds", "reproject")
-    refuse_degrees(np.hstack([HERE, HERE + 0.01]), "the point clouds", "reproject")
-    refuse_degrees(np.full((1, 4), np.nan), "the point clouds", "reproject")
 
 
 @pytest.mark.parametrize("target", [None, "EPSG:7415"])
@@ -429,9 +315,8 @@ def test_footprints_in_degrees_that_name_no_crs_are_refused_although_none_has_an
 ):
     in_degrees = shapely.transform(SQUARE, lambda xy: reproject(xy, RD, WGS84))
     path = write(tmp_path / "a.gpkg", [in_degrees, None], crs=None)
-    with pytest.raises(
-        InputError, match=r"names no CRS, in metres, got .* look like degrees; name their CRS"
-    ):
+    sentence = r"names no CRS, in metres, got .* look like degrees; name their CRS"
+    with pytest.raises(InputError, match=sentence):
         read_footprints(path, target_crs=target)
 
 
@@ -440,9 +325,8 @@ def test_overlap_is_checked_and_both_boxes_are_named():
     check_overlap(footprints, (84990, 445990, 85001, 446001))
     check_overlap(footprints, [(0, 0, 0, 1, 1, 9), (84990, 445990, -3, 85001, 446001, 9)])
     check_overlap(footprints[1:], (0, 0, 1, 1))
-    with pytest.raises(
-        InputError, match=r"x 4\.0.* to 5\.0.*RD New.*x 85005\.0 to 85005\.0.*no CRS"
-    ):
+    sentence = r"x 4\.0.* to 5\.0.*RD New.*x 85005\.0 to 85005\.0.*no CRS"
+    with pytest.raises(InputError, match=sentence):
         check_overlap(footprints, (4.0, 51.0, 5.0, 52.0), None, CRS.from_epsg(28992))
 
 
@@ -467,17 +351,14 @@ def bad_file(tmp_path, kind):
 
 
 BAD = {
-    **{
-        "missing": "no such file",
-        "empty file": "an empty file",
-        "not a vector file": "that GDAL reads",
-    },
-    **{
-        "truncated": "that GDAL reads|layer",
-        "no features": "without features",
-        "no polygons": "got LineString",
-    },
-    **{"no geometry": "without geometry", "metres called degrees": "outside that system"},
+    "missing": "no such file",
+    "empty file": "an empty file",
+    "not a vector file": "that GDAL reads",
+    "truncated": "that GDAL reads|layer",
+    "no features": "without features",
+    "no polygons": "got LineString",
+    "no geometry": "without geometry",
+    "metres called degrees": "outside that system",
 }
 
 
@@ -489,7 +370,7 @@ def test_what_cannot_be_read_gets_one_full_sentence(tmp_path, kind):
 
 
 def test_unknown_layers_and_attributes_are_answered_with_the_known_ones(tmp_path):
-    path = write(tmp_path / "a.gpkg", [SQUARE], name=np.array(["A"], object))
+    path = write(tmp_path / "a.gpkg", [SQUARE], name=["A"])
     with pytest.raises(InputError, match="it has buildings"):
         read_footprints(path, layer="roofs")
     with pytest.raises(InputError, match="got name; name one"):
@@ -509,8 +390,6 @@ def test_a_geojson_in_a_national_grid_that_names_no_crs_is_told_how_to_name_it(t
     (tmp_path / "a.geojson").write_text(
         json.dumps({"type": "FeatureCollection", "features": [feature]})
     )
-    with pytest.raises(
-        InputError,
-        match=r"they are no degrees: name their CRS in the file, .* \(`ogr2ogr -a_srs`\)",
-    ):
+    sentence = r"they are no degrees: name their CRS in the file, .* \(`ogr2ogr -a_srs`\)"
+    with pytest.raises(InputError, match=sentence):
         read_footprints(tmp_path / "a.geojson", target_crs="EPSG:28992")

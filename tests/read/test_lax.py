@@ -5,10 +5,13 @@ missed, little else read.
 import struct
 from itertools import pairwise
 
+import laspy
 import numpy as np
 import pytest
 
 from hiproof.errors import InputWarning
+from hiproof.read.points.las import read_points
+from hiproof.read.points.las_header import read_facts
 from hiproof.read.points.lax import read_lax
 from hiproof.read.points.pointcloud import iter_points
 from read.test_pointcloud import write_las
@@ -31,40 +34,19 @@ def write_lax(path, xyz, level=4, coarse_west=True, gap=3):
     """A quadtree of `level` levels; its western half is coarser; runs that are less than `gap`
     apart are one.
     """
-    root = (*np.floor(xyz[:, :2].min(axis=0)), *np.ceil(xyz[:, :2].max(axis=0)))
-    middle = (root[0] + root[2]) / 2
+    west, south = np.floor(xyz[:, :2].min(axis=0))
+    east, north = np.ceil(xyz[:, :2].max(axis=0))
     cells = {}
     for i, (x, y, _) in enumerate(xyz):
-        cells.setdefault(
-            find_cell(x, y, root, level - 2 if coarse_west and x < middle else level), []
-        ).append(i)
-    words = [
-        struct.pack(
-            "<4sI4sI4sIIII4f4sII",
-            b"LASX",
-            0,
-            b"LASS",
-            0,
-            b"LASQ",
-            0,
-            level,
-            0,
-            0,
-            root[0],
-            root[2],
-            root[1],
-            root[3],
-            b"LASV",
-            0,
-            len(cells),
-        )
-    ]
+        depth = level - 2 if coarse_west and x < (west + east) / 2 else level
+        cells.setdefault(find_cell(x, y, (west, south, east, north), depth), []).append(i)
+    head = (b"LASX", 0, b"LASS", 0, b"LASQ", 0, level, 0, 0, west, east, south, north)
+    words = [struct.pack("<4sI4sI4sIIII4f4sII", *head, b"LASV", 0, len(cells))]
     for cell, members in cells.items():
         starts = [0, *(np.flatnonzero(np.diff(members) > gap) + 1), len(members)]
-        runs = [(members[a], members[b - 1]) for a, b in pairwise(starts)]
-        words.append(
-            struct.pack(f"<iII{2 * len(runs)}I", cell, len(runs), len(members), *np.ravel(runs))
-        )
+        runs = np.ravel([(members[a], members[b - 1]) for a, b in pairwise(starts)])
+        form = f"<iII{len(runs)}I"
+        words.append(struct.pack(form, cell, len(runs) // 2, len(members), *runs))
     path.write_bytes(b"".join(words))
 
 
@@ -92,10 +74,9 @@ def test_the_runs_hold_every_point_of_any_boxes(indexed_cloud, seed, monkeypatch
     boxes = np.hstack([lower, lower + rng.uniform(1, 60, (3, 2))])
     runs = read_lax(path).find_runs(boxes)
     read = np.concatenate([cloud.xyz for cloud in iter_points(path, 100, runs=runs)])
-    is_expected = np.array(
-        [p for p in xyz if any((p[:2] >= b[:2]).all() and (p[:2] <= b[2:]).all() for b in boxes)]
-    )
-    assert {tuple(p) for p in is_expected.round(2)} <= {tuple(p) for p in read.round(2)}
+    xy = xyz[:, None, :2]
+    inside = ((xy >= boxes[:, :2]) & (xy <= boxes[:, 2:])).all(axis=2).any(axis=1)
+    assert set(map(tuple, xyz[inside].round(2))) <= set(map(tuple, read.round(2)))
     assert len(read) == (runs[:, 1] - runs[:, 0]).sum() < POINTS
 
 
@@ -121,12 +102,40 @@ def test_an_index_that_cannot_be_used_is_left_aside(indexed_cloud, harm):
     data = bytearray(index_path.read_bytes())
     if harm == "64 bits":
         data[56] = 1
-    index_path.write_bytes(
-        {
-            "cut off": data[: len(data) // 2 // 4 * 4],
-            "something else": b"not an index" * 20,
-            "empty": b"",
-        }.get(harm, data)
-    )
+    others = {"cut off": data[: len(data) // 2 // 4 * 4], "empty": b""}
+    others |= {"something else": b"not an index" * 20}
+    index_path.write_bytes(others.get(harm, data))
     with pytest.warns(InputWarning, match=r"a\.lax: is left aside"):
         assert read_lax(path) is None
+
+
+COUNT = 120_000  # more than two of LASzip's chunks
+
+
+def write_random(path, point_format):
+    rng = np.random.default_rng(point_format)
+    header = laspy.LasHeader(version="1.4", point_format=point_format)
+    header.scales, header.offsets = [0.01, 0.02, 0.001], [85_000.0, 446_000.0, -2.0]
+    header.add_extra_dims([laspy.ExtraBytesParams("height", "f8")])
+    las = laspy.LasData(header, laspy.ScaleAwarePointRecord.zeros(COUNT, header=header))
+    las.X, las.Y, las.Z = rng.integers(-90_000, 90_000, (3, COUNT))
+    las.classification = rng.integers(0, 256 if point_format >= 6 else 32, COUNT)
+    for flag in ("withheld", "synthetic", "key_point"):
+        las[flag] = rng.random(COUNT) < 0.3
+    las.write(path)
+    return las
+
+
+@pytest.mark.parametrize("ending", ["las", "laz"])
+@pytest.mark.parametrize("point_format", [0, 1, 2, 3, 6, 7, 8])
+def test_coordinates_classes_and_withheld_points_are_those_of_laspy(tmp_path, point_format, ending):
+    expected = write_random(tmp_path / f"cloud.{ending}", point_format)
+    runs = [(0, 3), (61_000, COUNT)]
+    kept = np.concatenate([np.arange(*run) for run in runs])
+    with open(tmp_path / f"cloud.{ending}", "rb") as file:
+        chunks = list(read_points(file, read_facts(file), runs, 20_000))
+    assert max(len(classes) for _, classes, _ in chunks) == 20_000
+    withheld = np.array(expected.withheld, bool)
+    truths = expected.xyz, np.array(expected.classification), withheld
+    for column, truth in zip(zip(*chunks, strict=True), truths, strict=True):
+        np.testing.assert_array_equal(np.concatenate(column), truth[kept])

@@ -106,7 +106,6 @@ def test_more_attributes_than_a_geopackage_has_columns_are_told_before_work(recw
     assert 1900 < room < 1998
     say_if_columns_run_out("f.gpkg", write_attributes(room))
     assert not recwarn
-    with pytest.warns(
-        InputWarning, match=f"has 2,500 attributes; buildings.gpkg holds the first {room:,}"
-    ):
+    remark = f"has 2,500 attributes; buildings.gpkg holds the first {room:,}"
+    with pytest.warns(InputWarning, match=remark):
         say_if_columns_run_out("f.gpkg", write_attributes(2500))

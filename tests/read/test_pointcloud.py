@@ -8,6 +8,7 @@ from dataclasses import replace
 import laspy
 import numpy as np
 import pytest
+from pyproj import CRS
 
 from hiproof.errors import InputError, InputWarning
 from hiproof.frames import METRES
@@ -19,7 +20,6 @@ from hiproof.read.points.pointcloud import (
     read_points,
     warn_coarse,
 )
-from hiproof.read.points.text import find_columns
 from hiproof.settings import Settings
 
 
@@ -31,13 +31,9 @@ def some_points(count=500, seed=0):
 
 def write_las(path, xyz, classes=None, epsg=None, version="1.4", point_format=6):
     header = laspy.LasHeader(version=version, point_format=point_format)
-    header.offsets, header.scales = (
-        np.floor(xyz.min(axis=0)) if len(xyz) else np.zeros(3),
-        np.full(3, 0.001),
-    )
+    header.offsets = np.floor(xyz.min(axis=0)) if len(xyz) else np.zeros(3)
+    header.scales = np.full(3, 0.001)
     if epsg is not None:
-        from pyproj import CRS
-
         header.add_crs(CRS.from_epsg(epsg))
     las = laspy.LasData(header)
     las.x, las.y, las.z = xyz.T
@@ -45,6 +41,21 @@ def write_las(path, xyz, classes=None, epsg=None, version="1.4", point_format=6)
         las.classification = classes
     las.write(path)
     return path
+
+
+PLY_HEAD = """ply
+format {form} 1.0
+comment a test
+element vertex {count}
+property uchar red
+property double x
+property double y
+property double z
+property uchar scalar_Classification
+element face 0
+property list uchar int vertex_indices
+end_header
+"""
 
 
 def write_copc(path, xyz, classes):
@@ -73,31 +84,17 @@ def write_copc(path, xyz, classes):
 
 
 def write_ply(path, xyz, classes, form):
-    head = (
-        f"ply\nformat {form} 1.0\ncomment a test\nelement vertex {len(xyz)}\nproperty uchar red\n"
-    )
-    head += (
-        "property double x\nproperty double y\nproperty double z\nproperty uchar "
-        "scalar_Classification\n"
-    )
-    head += "element face 0\nproperty list uchar int vertex_indices\nend_header\n"
+    head = PLY_HEAD.format(form=form, count=len(xyz)).encode()
     if form == "ascii":
-        rows = "".join(
-            f"7 {x:.3f} {y:.3f} {z:.3f} {c}\n" for (x, y, z), c in zip(xyz, classes, strict=True)
-        )
-        path.write_bytes(head.encode() + rows.encode())
+        points = zip(*xyz.T, classes, strict=True)
+        rows = "".join(f"7 {x:.3f} {y:.3f} {z:.3f} {c}\n" for x, y, z, c in points)
+        path.write_bytes(head + rows.encode())
         return path
-    order = "<" if "little" in form else ">"
-    kinds = [
-        ("red", "u1"),
-        ("x", order + "f8"),
-        ("y", order + "f8"),
-        ("z", order + "f8"),
-        ("c", "u1"),
-    ]
+    number = ("<" if "little" in form else ">") + "f8"
+    kinds = [("red", "u1"), *((name, number) for name in "xyz"), ("c", "u1")]
     records = np.zeros(len(xyz), np.dtype(kinds))
     records["x"], records["y"], records["z"], records["c"] = *xyz.T, classes
-    path.write_bytes(head.encode() + records.tobytes())
+    path.write_bytes(head + records.tobytes())
     return path
 
 
@@ -130,32 +127,25 @@ FORMATS = {
 def test_points_and_classes_come_back_in_every_format(tmp_path, name):
     xyz, classes = some_points()
     path = FORMATS[name](tmp_path, xyz, classes)
-    cloud = read_points(path)
+    cloud, header = read_points(path), read_header(path)
     assert np.allclose(cloud.xyz, xyz, atol=1e-6)
     assert np.array_equal(cloud.classification, classes)
-    header = read_header(path)
     assert header.count == len(xyz)
     assert np.allclose(header.bounds, [*xyz.min(axis=0), *xyz.max(axis=0)])
 
 
 @pytest.mark.parametrize("name", FORMATS)
 def test_chunks_and_boxes_agree_with_the_whole(tmp_path, name):
+    """Their coordinates lie in one piece, so that nothing is compiled for a format."""
     xyz, classes = some_points()
     path = FORMATS[name](tmp_path, xyz, classes)
     chunks = list(iter_points(path, chunk_points=64))
     assert max(map(len, chunks)) <= 64
+    assert all(cloud.xyz.flags.c_contiguous for cloud in chunks)
     assert np.allclose(np.concatenate([c.xyz for c in chunks]), xyz, atol=1e-6)
-    box = (85010.0, 446005.0, 85030.0, 446030.0)
-    inside = (
-        (xyz[:, 0] >= 85010) & (xyz[:, 0] <= 85030) & (xyz[:, 1] >= 446005) & (xyz[:, 1] <= 446030)
-    )
-    assert np.allclose(read_points(path, box=box).xyz, xyz[inside], atol=1e-6)
-
-
-@pytest.mark.parametrize("name", FORMATS)
-def test_coordinates_lie_in_one_piece_so_that_nothing_is_compiled_for_a_format(tmp_path, name):
-    path = FORMATS[name](tmp_path, *some_points())
-    assert all(cloud.xyz.flags.c_contiguous for cloud in iter_points(path))
+    lower, upper = (85010.0, 446005.0), (85030.0, 446030.0)
+    inside = ((xyz[:, :2] >= lower) & (xyz[:, :2] <= upper)).all(axis=1)
+    assert np.allclose(read_points(path, box=(*lower, *upper)).xyz, xyz[inside], atol=1e-6)
 
 
 def test_copc_is_told_from_laz_by_its_first_record(tmp_path):
@@ -172,12 +162,9 @@ def test_coordinates_at_ten_million_keep_their_millimetres(tmp_path):
 def test_crs_comes_from_the_header_and_the_setting_overrules_it(tmp_path):
     xyz, _ = some_points(20)
     path = write_las(tmp_path / "a.laz", xyz, epsg=28992)
-    assert read_points(path).crs.to_epsg() == 28992
-    assert read_header(path).crs.to_epsg() == 28992
-    assert (
-        read_points(path, settings=Settings.from_dict({"read": {"crs": "EPSG:7415"}})).crs.to_epsg()
-        == 7415
-    )
+    assert read_points(path).crs.to_epsg() == read_header(path).crs.to_epsg() == 28992
+    settings = Settings.from_dict({"read": {"crs": "EPSG:7415"}})
+    assert read_points(path, settings=settings).crs.to_epsg() == 7415
     assert read_points(write_las(tmp_path / "b.las", xyz)).crs is None
 
 
@@ -196,9 +183,8 @@ def test_notes_and_lists_of_a_delivery_are_left_aside_and_said(tmp_path):
     cloud, points = write_las(tmp_path / "a.laz", xyz), write_text(tmp_path / "b.csv", xyz, classes)
     (tmp_path / "notes.txt").write_text("The delivery\nof 2023")
     (tmp_path / "tiles.csv").write_text("name,area\na,1\n")
-    with pytest.warns(
-        InputWarning, match=r"text without points is left aside: notes\.txt, tiles\.csv"
-    ):
+    remark = r"text without points is left aside: notes\.txt, tiles\.csv"
+    with pytest.warns(InputWarning, match=remark):
         assert expand_paths((tmp_path,)) == [cloud, points]
     cloud.unlink()
     points.unlink()
@@ -219,11 +205,6 @@ def test_text_layouts_are_recognised(tmp_path, text):
     (tmp_path / "a.pts").write_text(text)
     cloud = read_points(tmp_path / "a.pts")
     assert cloud.xyz.tolist() == [[1, 2, 3], [4, 5, 6]] and cloud.classification is None
-
-
-def test_columns_need_all_three_coordinates():
-    assert find_columns(["x", "y", "classification"]) is None
-    assert find_columns(["Easting", "Northing", "Elevation"]) == (0, 1, 2)
 
 
 def test_points_that_are_not_finite_are_dropped_with_a_warning(tmp_path):
@@ -270,9 +251,8 @@ def test_coordinates_in_coarse_steps_are_told_of_once(
 ):
     header = read_header(write(tmp_path / name, some_points()[0], plan, height))
     copies = [replace(header, path=other) for other in ("b", "c")]
-    with pytest.warns(
-        InputWarning, match=f"{name} and 2 more: coordinates come in steps of {is_remarked}, and"
-    ) as caught:
+    remark = f"{name} and 2 more: coordinates come in steps of {is_remarked}, and"
+    with pytest.warns(InputWarning, match=remark) as caught:
         warn_coarse([header, *copies], METRES)
     assert len(caught) == 1
 
@@ -355,30 +335,24 @@ def damaged_points(tmp_path, kind):
 
 BAD = {
     **dict.fromkeys(("truncated laz", "truncated las", "header only", "garbled laz"), "truncated"),
-    **{
-        "missing records": "4000000000 records",
-        "text as laz": "rename it to .xyz",
-        "empty": "an empty file",
-    },
-    **{
-        "missing": "no such file",
-        "empty folder": "point files in the folder",
-        "zero points": "got none",
-    },
-    **{"truncated ply": "the file is truncated", "ply of faces": "'face' before the vertices"},
-    **{
-        "ply without end": "does not end",
-        "prose": "Dear reader",
-        "word among numbers": "after 0 points",
-    },
-    **{"two columns": "nothing like a point", "binary text": "binary data"},
-    **{
-        "degrees": "in degrees",
-        "other ending": r"ending in \.jpg",
-        "UTF-16": "got UTF-16",
-        "grid": "ESRI ASCII grid",
-        "E57": r"got E57; convert it first .*cloud\.laz",
-    },
+    "missing records": "4000000000 records",
+    "text as laz": "rename it to .xyz",
+    "empty": "an empty file",
+    "missing": "no such file",
+    "empty folder": "point files in the folder",
+    "zero points": "got none",
+    "truncated ply": "the file is truncated",
+    "ply of faces": "'face' before the vertices",
+    "ply without end": "does not end",
+    "prose": "Dear reader",
+    "word among numbers": "after 0 points",
+    "two columns": "nothing like a point",
+    "binary text": "binary data",
+    "degrees": "in degrees",
+    "other ending": r"ending in \.jpg",
+    "UTF-16": "got UTF-16",
+    "grid": "ESRI ASCII grid",
+    "E57": r"got E57; convert it first .*cloud\.laz",
 }
 
 

@@ -28,13 +28,16 @@ def city_object(kind="Solid"):
     values = [kinds.index(face.kind) for face in SOLID.faces]
     nested = {"MultiSurface": (shell, values), "Solid": ([shell], [values])}
     boundaries, values = nested.get(kind, ([[shell], [shell]], [[values], [values]]))
-    semantics = {"surfaces": OTHER_SURFACES, "values": values}
-    return {
-        "type": "Building",
-        "geometry": [
-            {"type": kind, "lod": "2.2", "boundaries": boundaries, "semantics": semantics}
-        ],
-    }
+    geometry = {"type": kind, "lod": "2.2", "boundaries": boundaries}
+    geometry["semantics"] = {"surfaces": OTHER_SURFACES, "values": values}
+    return {"type": "Building", "geometry": [geometry]}
+
+
+def wrap(text, *names):
+    """A text within XML elements, the innermost first."""
+    for name in names:
+        text = f"<{name}>{text}</{name.split()[0]}>"
+    return text
 
 
 def integer_vertices():
@@ -56,38 +59,31 @@ def gml(xlinked=True, points="posList"):
 
     def ring_text(ring):
         xyz = [" ".join(map(repr, SOLID.vertices[v].tolist())) for v in (*ring, ring[0])]
-        inside = f"<gml:posList>{' '.join(xyz)}</gml:posList>" if points == "posList" else ""
-        return inside or "".join(f"<gml:pos>{place}</gml:pos>" for place in xyz)
+        if points == "posList":
+            return wrap(" ".join(xyz), "gml:posList", "gml:LinearRing")
+        return wrap("".join(wrap(place, "gml:pos") for place in xyz), "gml:LinearRing")
 
     def polygon(k, face):
-        rings = [f"<gml:LinearRing>{ring_text(ring)}</gml:LinearRing>" for ring in face.rings]
-        holes = "".join(f"<gml:interior>{ring}</gml:interior>" for ring in rings[1:])
-        return (
-            "<gml:Polygon "
-            f'gml:id="p{k}"><gml:exterior>{rings[0]}</gml:exterior>{holes}</gml:Polygon>'
-        )
+        outer, *holes = map(ring_text, face.rings)
+        rings = wrap(outer, "gml:exterior") + "".join(wrap(h, "gml:interior") for h in holes)
+        return wrap(rings, f'gml:Polygon gml:id="p{k}"', "gml:surfaceMember")
 
     surfaces, members = "", ""
     for k, face in enumerate(SOLID.faces):
         if xlinked:
             members += f'<gml:surfaceMember xlink:href="#p{k}"/>'
-            surface = polygon(k, face)
-            surface = f"<gml:surfaceMember>{surface}</gml:surfaceMember>"
-            surface = f"<gml:MultiSurface>{surface}</gml:MultiSurface>"
-            surface = f"<bldg:lod2MultiSurface>{surface}</bldg:lod2MultiSurface>"
-            surface = f"<bldg:{face.kind}>{surface}</bldg:{face.kind}>"
-            surfaces += f"<bldg:boundedBy>{surface}</bldg:boundedBy>"
+            outside = ("bldg:lod2MultiSurface", f"bldg:{face.kind}", "bldg:boundedBy")
+            surfaces += wrap(polygon(k, face), "gml:MultiSurface", *outside)
         else:
-            members += f"<gml:surfaceMember>{polygon(k, face)}</gml:surfaceMember>"
-    shell = f"<gml:exterior><gml:CompositeSurface>{members}</gml:CompositeSurface></gml:exterior>"
-    building = f"<bldg:lod2Solid><gml:Solid>{shell}</gml:Solid></bldg:lod2Solid>{surfaces}"
-    building = f'<bldg:Building gml:id="house">{building}</bldg:Building>'
+            members += polygon(k, face)
+    solid = wrap(members, "gml:CompositeSurface", "gml:exterior", "gml:Solid", "bldg:lod2Solid")
     names = (
         'xmlns="http://www.opengis.net/citygml/2.0" '
         'xmlns:bldg="http://www.opengis.net/citygml/building/2.0"'
         ' xmlns:gml="http://www.opengis.net/gml" xmlns:xlink="http://www.w3.org/1999/xlink"'
     )
-    return f"<CityModel {names}><cityObjectMember>{building}</cityObjectMember></CityModel>"
+    building = ('bldg:Building gml:id="house"', "cityObjectMember", f"CityModel {names}")
+    return wrap(solid + surfaces, *building)
 
 
 def write_text(folder, name, text):
@@ -96,13 +92,13 @@ def write_text(folder, name, text):
     return path
 
 
+def list_solids(folder, name, text):
+    return list(read_solids(write_text(folder, name, text)))
+
+
 def seq():
-    feature = {
-        "type": "CityJSONFeature",
-        "id": "house",
-        "CityObjects": {"house": city_object()},
-        "vertices": integer_vertices(),
-    }
+    feature = {"type": "CityJSONFeature", "id": "house", "vertices": integer_vertices()}
+    feature["CityObjects"] = {"house": city_object()}
     header = {**city(), "CityObjects": {}, "vertices": []}
     return f"{json.dumps(header)}\n{json.dumps(feature)}\n\n"
 
@@ -118,15 +114,13 @@ FILES = {
 
 @pytest.mark.parametrize("name", FILES)
 def test_solid_comes_back(tmp_path, name):
-    ((found_id, solid),) = read_solids(write_text(tmp_path, name, FILES[name]))
+    ((found_id, solid),) = list_solids(tmp_path, name, FILES[name])
     assert found_id == "house"
     assert check_solid(solid) == ()
     assert solid.volume == pytest.approx(SOLID.volume)
     if name != "by_value.gml":
-        kinds = ("RoofSurface", "WallSurface", "GroundSurface")
-        assert [len(solid.select_faces(kind)) for kind in kinds] == [
-            len(SOLID.select_faces(kind)) for kind in kinds
-        ]
+        for kind in ("RoofSurface", "WallSurface", "GroundSurface"):
+            assert len(solid.select_faces(kind)) == len(SOLID.select_faces(kind))
 
 
 @pytest.mark.parametrize(
@@ -140,46 +134,38 @@ def test_other_geometries_come_out_shell_by_shell(tmp_path, kind, ids):
 
 def test_inner_shell_is_turned_inside_out(tmp_path):
     model = city()
-    (outer,) = model["CityObjects"]["house"]["geometry"][0]["boundaries"]
-    model["CityObjects"]["house"]["geometry"][0]["boundaries"] = [
-        outer,
-        [[ring[::-1] for ring in face] for face in outer],
-    ]
-    del model["CityObjects"]["house"]["geometry"][0]["semantics"]
-    results = list(read_solids(write_text(tmp_path, "a.json", json.dumps(model))))
+    (geometry,) = model["CityObjects"]["house"]["geometry"]
+    (outer,) = geometry["boundaries"]
+    geometry["boundaries"] = [outer, [[ring[::-1] for ring in face] for face in outer]]
+    del geometry["semantics"]
+    results = list_solids(tmp_path, "a.json", json.dumps(model))
     assert len(results) == 2 and all(check_solid(solid) == () for _, solid in results)
 
 
 def test_other_surfaces_of_a_shell_become_one_of_three(tmp_path):
     model = city()
     (geometry,) = model["CityObjects"]["house"]["geometry"]
-    geometry["semantics"]["surfaces"] = [
-        {"type": "OuterFloorSurface"},
-        {"type": "ClosureSurface"},
-        {"type": "OuterCeilingSurface"},
-    ]
-    ((_, solid),) = read_solids(write_text(tmp_path, "a.json", json.dumps(model)))
+    names = ("OuterFloorSurface", "ClosureSurface", "OuterCeilingSurface")
+    geometry["semantics"]["surfaces"] = [{"type": name} for name in names]
+    ((_, solid),) = list_solids(tmp_path, "a.json", json.dumps(model))
     assert [face.kind for face in solid.faces] == [face.kind for face in SOLID.faces]
     geometry["semantics"]["surfaces"][0]["type"] = "gable"
     with pytest.raises(InputError, match="gable"):
-        list(read_solids(write_text(tmp_path, "b.json", json.dumps(model))))
+        list_solids(tmp_path, "b.json", json.dumps(model))
 
 
 def test_open_ring_is_a_finding(tmp_path):
-    text = gml()
-    start = text.index("<gml:posList>") + len("<gml:posList>")
-    stop = text.index("</gml:posList>")
-    opened = text[:start] + " ".join(text[start:stop].split()[:-3]) + text[stop:]
-    ((_, solid),) = read_solids(write_text(tmp_path, "open.gml", opened))
+    before, start, text = gml().partition("<gml:posList>")
+    places, stop, after = text.partition("</gml:posList>")
+    opened = before + start + " ".join(places.split()[:-3]) + stop + after
+    ((_, solid),) = list_solids(tmp_path, "open.gml", opened)
     assert [finding.code for finding in check_solid(solid)] == [103]
 
 
 def test_building_without_solid_gives_its_surfaces(tmp_path):
-    text = gml()
-    start, stop = text.index("<bldg:lod2Solid>"), text.index("</bldg:lod2Solid>")
-    ((name, solid),) = read_solids(
-        write_text(tmp_path, "surfaces.gml", text[:start] + text[stop + len("</bldg:lod2Solid>") :])
-    )
+    before, _, text = gml().partition("<bldg:lod2Solid>")
+    surfaces = before + text.partition("</bldg:lod2Solid>")[2]
+    ((name, solid),) = list_solids(tmp_path, "surfaces.gml", surfaces)
     assert name == "house" and check_solid(solid) == ()
 
 
@@ -216,9 +202,8 @@ def test_marks_of_the_encoding_are_no_damage(name, tmp_path):
 
 
 def test_missing_and_binary_files_raise_a_sentence(tmp_path):
-    with pytest.raises(
-        InputError, match=r"got the folder .*; name one in it, such as buildings\.city\.jsonl"
-    ):
+    sentence = r"got the folder .*; name one in it, such as buildings\.city\.jsonl"
+    with pytest.raises(InputError, match=sentence):
         list(read_solids(tmp_path))
     with pytest.raises(InputError, match="got none"):
         list(read_solids(tmp_path / "none.json"))

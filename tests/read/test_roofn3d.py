@@ -62,9 +62,8 @@ def test_buildings_come_back_once_with_our_names_of_their_types(buildings):
         ("10", None),
     ]
     assert records[3].class_name == "Onion dome"
-    assert np.array_equal(records[0].points, roof(0)) and records[0].outline.equals(
-        shapely.box(0, 0, 9, 6)
-    )
+    assert np.array_equal(records[0].points, roof(0))
+    assert records[0].outline.equals(shapely.box(0, 0, 9, 6))
 
 
 def test_labels_are_found_by_coordinates(buildings, tmp_path):

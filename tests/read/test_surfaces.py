@@ -61,38 +61,24 @@ ROOFS = [
     [(X, Y, 5), (X + 12, Y, 5), (X + 12, Y + 4.5, 8), (X, Y + 4.5, 8), (X, Y, 5)],
     [(X, Y + 4.5, 8), (X + 12, Y + 4.5, 8), (X + 12, Y + 9, 5), (X, Y + 9, 5), (X, Y + 4.5, 8)],
 ]
+HAIR_OFF = [(x, y + 4e-4, z) for x, y, z in ROOFS[1]]
+TOWER = surface(6, 3, body([(x / 3, y / 3) for x, y in SQUARE], 106, 120))
+CORNER = np.array([(X, Y, 0), (X + 4, Y, 9), (X, Y + 4, 3), (X, Y, 0)])
 KINDS = {
     "TIN": (surface(TIN, TRIANGLE, triangles(body(SQUARE))), [108.0]),
     "TIN of the other byte order": (surface(TIN, TRIANGLE, triangles(body(SQUARE)), ">"), [108.0]),
     "polyhedral surface": (surface(POLYHEDRON, 3, body(ELL)), [90.0]),
     "multipolygon": (surface(6, 3, body(ELL)), [90.0]),
     "collection": (collection(surface(TIN, TRIANGLE, triangles(body(SQUARE)))), [108.0]),
-    "collection in a collection": (
-        collection(collection(surface(POLYHEDRON, 3, body(ELL)))),
-        [90.0],
-    ),
+    "collection in a collection": (collection(collection(surface(POLYHEDRON, 3, body(ELL)))), [90]),
     "collection of two bodies": (
         collection(*[surface(POLYHEDRON, 3, body(r)) for r in (SQUARE, AWAY)]),
         [108.0] * 2,
     ),
-    "tower on a house": (
-        collection(
-            surface(POLYHEDRON, 3, body(SQUARE)),
-            surface(6, 3, body([(x / 3, y / 3) for x, y in SQUARE], 106, 120)),
-        ),
-        [108.0],
-    ),
+    "tower on a house": (collection(surface(POLYHEDRON, 3, body(SQUARE)), TOWER), [108.0]),
     "roofs alone": (surface(6, 3, ROOFS), [108.0]),
-    "roofs a hair apart": (
-        surface(6, 3, [ROOFS[0], [(x, y + 4e-4, z) for x, y, z in ROOFS[1]]]),
-        [108.0],
-    ),
-    "a triangle": (
-        surface(6, 3, [])[:0]
-        + struct.pack("<BIII", 1, 1017, 1, 4)
-        + np.array([(X, Y, 0), (X + 4, Y, 9), (X, Y + 4, 3), (X, Y, 0)]).tobytes(),
-        [8.0],
-    ),
+    "roofs a hair apart": (surface(6, 3, [ROOFS[0], HAIR_OFF]), [108.0]),
+    "a triangle": (struct.pack("<BIII", 1, 1017, 1, 4) + CORNER.tobytes(), [8.0]),
 }
 """(WKB, areas from above) by name."""
 
@@ -113,15 +99,11 @@ def write(path, declared, *geometries):
 @pytest.mark.parametrize("kind", KINDS)
 def test_each_body_has_the_outline_of_its_faces_from_above(tmp_path, kind):
     geometry, areas = KINDS[kind]
-    path = write(tmp_path / "a.gpkg", "GEOMETRY", geometry)
-    footprints = read_footprints(path)
-    assert [footprint.polygon.area for footprint in footprints] == pytest.approx(areas, abs=0.02)
-    assert [footprint.id for footprint in footprints] == (
-        ["h0"] if len(areas) == 1 else ["h0-1", "h0-2"]
-    )
-    assert all(
-        footprint.polygon.is_valid and not footprint.polygon.interiors for footprint in footprints
-    )
+    footprints = read_footprints(write(tmp_path / "a.gpkg", "GEOMETRY", geometry))
+    polygons = [footprint.polygon for footprint in footprints]
+    assert [polygon.area for polygon in polygons] == pytest.approx(areas, abs=0.02)
+    assert [f.id for f in footprints] == (["h0"] if len(areas) == 1 else ["h0-1", "h0-2"])
+    assert all(polygon.is_valid and not polygon.interiors for polygon in polygons)
 
 
 @pytest.mark.parametrize("declared", ["TIN", "POLYHEDRALSURFACE", "GEOMETRY"])
@@ -151,16 +133,12 @@ def test_one_refused_layer_among_others_is_listed(tmp_path):
 
 
 def test_polygons_of_one_feature_that_overlap_are_one_and_those_beside_each_other_several():
-    house = shapely.box(0, 0, 10, 10)
-    annex = shapely.box(8, 0, 14, 6)
-    other = shapely.box(10, 0, 15, 10)
-    (whole,) = simple_polygons(shapely.MultiPolygon([house, annex]))
+    house, other = shapely.box(0, 0, 10, 10), shapely.box(10, 0, 15, 10)
+    (whole,) = simple_polygons(shapely.MultiPolygon([house, shapely.box(8, 0, 14, 6)]))
     assert whole.area == pytest.approx(124.0)
-    assert [polygon.area for polygon in simple_polygons(shapely.MultiPolygon([house, other]))] == [
-        100.0,
-        50.0,
-    ]
-    level = shapely.force_3d(shapely.MultiPolygon([house, other]), 4.0)
+    beside = shapely.MultiPolygon([house, other])
+    assert [polygon.area for polygon in simple_polygons(beside)] == [100.0, 50.0]
+    level = shapely.force_3d(beside, 4.0)
     assert not is_surface(level) and not is_surface(house) and not is_surface(None)
 
 
@@ -185,15 +163,10 @@ def test_closed_lines_are_refused_in_one_sentence(tmp_path):
 def test_wkb_of_postgis_is_renamed_too_and_damaged_wkb_left_alone():
     flags = 0x80000000 | 0x20000000
     faces = surface(TIN, TRIANGLE, triangles(body(SQUARE)), add=0x80000000)
-    ewkb = (
-        faces[:1]
-        + struct.pack("<IiI", TIN | flags, 32633, struct.unpack_from("<I", faces, 5)[0])
-        + faces[9:]
-    )
+    head = struct.pack("<IiI", TIN | flags, 32633, struct.unpack_from("<I", faces, 5)[0])
+    ewkb = faces[:1] + head + faces[9:]
     (geometry,) = decode_geometries(np.array([ewkb], object))
     assert geometry.geom_type == "MultiPolygon" and shapely.get_srid(geometry) == 32633
     assert as_polygons(ewkb[:100]) == ewkb[:100]
-    cut, curve, none = decode_geometries(
-        np.array([ewkb[:100], struct.pack("<BII", 1, 10, 0), None], object)
-    )
-    assert cut is None and curve is None and none is None
+    damaged = np.array([ewkb[:100], struct.pack("<BII", 1, 10, 0), None], object)
+    assert list(decode_geometries(damaged)) == [None] * 3

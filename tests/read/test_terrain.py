@@ -11,7 +11,6 @@ from pyproj import Transformer
 
 import layers
 from hiproof.errors import InputError
-from hiproof.geometry.thin import thin_to_grid
 from hiproof.read.terrain import TerrainChain, raster, read_terrain
 
 WEST, NORTH = 85000.0, 446200.0
@@ -104,16 +103,6 @@ def test_heights_that_no_ground_has_are_unknown_although_the_raster_does_not_say
         np.array([[WEST + 10, NORTH - 20], [WEST + 29.8, NORTH - 20], [WEST + 50, NORTH - 20]])
     )
     assert np.isnan(result[0]) and result[1:].tolist() == [2.0, 2.0]
-
-
-def test_thinning_depends_neither_on_order_nor_on_tiles():
-    points = ground(3000)
-    shuffled = points[np.random.default_rng(4).permutation(len(points))]
-    whole = thin_to_grid(points, 1.0)
-    assert np.array_equal(whole, thin_to_grid(shuffled, 1.0))
-    west, east = points[points[:, 0] < WEST + 30], points[points[:, 0] >= WEST + 30]
-    tiles = np.concatenate([thin_to_grid(west, 1.0), thin_to_grid(east, 1.0)])
-    assert np.allclose(np.sort(tiles, axis=0), np.sort(whole, axis=0), atol=1e-9)
 
 
 class Around:

@@ -317,9 +317,8 @@ def test_a_header_that_cannot_be_understood_is_refused_unless_something_stands_i
     """It was taken as unknown, and feet as metres."""
     assert isinstance(crs_through_a_file(tmp_path, FAULTY[kind]), UnknownCRS)
     path = tmp_path / "a.las"
-    with pytest.raises(
-        InputError, match="name the right one with --crs, or its unit alone with --unit"
-    ):
+    sentence = "name the right one with --crs, or its unit alone with --unit"
+    with pytest.raises(InputError, match=sentence):
         read_points(path)
     assert (
         read_points(path, settings=Settings.from_dict({"read": {"crs": "EPSG:2222"}})).units.plan
@@ -406,9 +405,8 @@ OWN_METRES = (34735, directory(*OWN, *short(k3076=9001, k4096=5703)))
 def test_a_local_cloud_takes_its_place_from_the_footprints_and_keeps_its_heights(tmp_path):
     path = write_footprints(tmp_path / "f.gpkg", "EPSG:32633")
     frame = find_frame(tmp_path, OWN_METRES, path)
-    assert (
-        frame.crs.sub_crs_list[0].to_epsg() == 32633 and vertical_crs(frame.crs).to_epsg() == 5703
-    )
+    assert frame.crs.sub_crs_list[0].to_epsg() == 32633
+    assert vertical_crs(frame.crs).to_epsg() == 5703
     single_frame = find_frame(tmp_path, OWN_FEET)
     assert (single_frame.units.plan, single_frame.units.height) == pytest.approx((US_FOOT, 1.0))
     heights = find_frame(tmp_path, (34735, directory(*short(k4099=9003))), path)

@@ -133,11 +133,6 @@ def test_thinning_to_a_grid_keeps_the_extent_and_bounds_the_count():
     assert (np.ptp(xyz[thinned], axis=0) > 0.85 * np.ptp(xyz, axis=0)).all()
 
 
-def test_thinning_does_not_depend_on_the_chunk():
-    xyz = np.random.default_rng(1).uniform(0, (40.0, 20.0, 6.0), (5_000, 3))
-    assert thin_to_grid(xyz, 500, chunk=700).tolist() == thin_to_grid(xyz, 500).tolist()
-
-
 @pytest.mark.parametrize("shape", [(1, 3), (9, 3), (25, 3), (70, 3), (3000, 3)])
 def test_arrangement_has_the_layouts_shapes(shape):
     arranged = arrange(np.random.default_rng(2).uniform(0, 10, shape), LAYOUT)

@@ -1,17 +1,35 @@
 """The shipped network: what it must recognise, what it may not depend on, and what it refuses."""
 
+import csv
 import tracemalloc
 from functools import partial
 from pathlib import Path
 
+import laspy
 import numpy as np
 import pytest
 from benchmarks.samples import training_sample
+from click.testing import CliRunner
 
-from hiproof.errors import FitError, InputError, SettingsError
+from hiproof.cli.app import import_command
+from hiproof.errors import FitError, InputError, OutputError, SettingsError
 from hiproof.fit import fit_roof
-from hiproof.segment import NOT_ROOF, Segmentation, choose_most_probable, inference, segment
+from hiproof.segment import (
+    NOT_ROOF,
+    Segmentation,
+    choose_most_probable,
+    combine,
+    inference,
+    segment,
+)
+from hiproof.segment.files import segment_files
 from hiproof.segment.inference import SHIPPED_WEIGHTS, carried_back, load
+from hiproof.segment.posterior import (
+    EVIDENCE_EXPONENT,
+    OUTLIER_DISTANCE_M,
+    SMALLEST_PRIOR,
+    expected_distance,
+)
 from hiproof.settings import Settings
 from hiproof.simulate import ROOF_TYPES
 
@@ -213,3 +231,133 @@ def test_types_the_network_does_not_know_are_refused():
             np.random.default_rng(0).random((20, 3)),
             Settings().replace({"fit": {"types": ("igloo",)}}),
         )
+
+
+TYPES = {"gable": 0.6, "hip": 0.3, "flat": 0.1}
+
+
+def test_posterior_is_a_distribution_best_first():
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        prior = dict(zip("abcde", rng.dirichlet(np.ones(5)), strict=True))
+        posterior = combine(prior, {name: rng.normal(0, 200) for name in prior})
+        assert sum(posterior.values()) == pytest.approx(1.0)
+        assert list(posterior.values()) == sorted(posterior.values(), reverse=True)
+
+
+def test_a_zero_probability_is_bounded_so_that_evidence_can_undo_it():
+    evidence = -2 * np.log(SMALLEST_PRIOR) / EVIDENCE_EXPONENT * 10
+    assert next(iter(combine({"gable": 1.0, "hip": 0.0}, {"gable": evidence, "hip": 0.0}))) == "hip"
+
+
+def test_types_without_evidence_or_without_prior():
+    assert combine(TYPES, {}) == pytest.approx(TYPES)
+    assert combine(TYPES, {"gable": float("inf"), "hip": float("nan")}) == pytest.approx(TYPES)
+    assert set(combine(TYPES, {"gable": 1.0, "cone": 1.0})) == {*TYPES, "cone"}
+    assert combine({}, {"gable": 10.0, "hip": 10.0}) == pytest.approx({"gable": 0.5, "hip": 0.5})
+    assert combine({}, {}) == {}
+
+
+def test_a_type_the_fit_gave_up_is_behind_the_best_but_its_evidence_says_little():
+    bics = {"gable": 0.0, "hip": 4.0}
+    even = dict.fromkeys(TYPES, 1 / 3)
+    assert list(combine(even, bics, points=200)) == ["gable", "hip", "flat"]
+    assert (
+        next(iter(combine({"flat": 0.99, "gable": 0.005, "hip": 0.005}, bics, points=200)))
+        == "flat"
+    )
+    many_points = combine(even, bics, points=2000)["flat"]
+    few_points = combine(even, bics, points=20)["flat"]
+    assert many_points < few_points
+
+
+class FakeFit:
+    """What `choose_most_probable` needs of a fit."""
+
+    points_used = 100
+
+    def __init__(self, names, noise_m=0.05, outlier_share=0.0, objective="likelihood"):
+        self.type, self.bics = (
+            (names[0], {names[0]: 50.0}) if names else ("gable", {"gable": 0.0, "hip": 8.0})
+        )
+        self.noise_m, self.outlier_share, self.objective = noise_m, outlier_share, objective
+
+
+def test_most_probable_fits_again_only_where_the_network_disagrees_with_the_evidence():
+    requests = []
+
+    def fit(names):
+        requests.append(names)
+        return FakeFit(names)
+
+    choice, posterior = choose_most_probable(fit, {"gable": 0.9, "hip": 0.1})
+    assert choice.type == "gable" == next(iter(posterior)) and requests == [()]
+    choice, posterior = choose_most_probable(fit, {"gable": 0.01, "hip": 0.99})
+    assert choice.type == "hip" == next(iter(posterior)) and requests == [(), (), ("hip",)]
+
+
+@pytest.mark.parametrize("worse", [{"noise_m": 0.09}, {"outlier_share": 0.05}])
+def test_a_named_type_far_from_the_points_is_not_built(worse):
+    def fit(names):
+        return FakeFit(names, **(worse if names else {}))
+
+    choice, posterior = choose_most_probable(fit, {"gable": 0.01, "hip": 0.99})
+    assert next(iter(posterior)) == "hip" and choice.type == "gable"
+
+
+def test_with_the_papers_objective_the_named_type_is_built():
+    def fit(names):
+        return FakeFit(names, noise_m=0.9 if names else 0.5, objective="paper")
+
+    choice, _ = choose_most_probable(fit, {"gable": 0.01, "hip": 0.99})
+    assert choice.type == "hip"
+
+
+def test_expected_distance_is_the_mean_over_noise_and_outliers():
+    distances = np.abs(np.random.default_rng(0).normal(0, 0.05, 100_000))
+    assert expected_distance(FakeFit(())) == pytest.approx(distances.mean(), rel=0.01)
+    assert expected_distance(FakeFit((), outlier_share=1.0)) == OUTLIER_DISTANCE_M
+
+
+def write_cloud(path, seed, shift=(85_000.0, 446_000.0, 10.0)):
+    points = np.round(training_sample(np.random.default_rng(seed))[0] + shift, 3)
+    np.savetxt(path, points, fmt="%.3f")
+    return points
+
+
+def test_points_and_table_say_what_segment_says(tmp_path):
+    clouds = [tmp_path / "a.xyz", tmp_path / "b.xyz"]
+    points = [write_cloud(path, seed) for seed, path in enumerate(clouds)]
+    out = tmp_path / "labelled.laz"
+    assert segment_files(clouds, out, Settings()) == {}
+    las = laspy.read(out)
+    np.testing.assert_allclose(las.xyz, np.concatenate(points), atol=1e-3)
+    results = [segment(cloud) for cloud in points]
+    assert (las.roof_type == np.concatenate([f.labels + 1 for f in results])).mean() > 0.99
+    assert np.bincount(las.building).tolist() == [0, *map(len, points)]
+    rows = list(csv.DictReader(out.with_suffix(".csv").read_text().splitlines()))
+    assert [row["type"] for row in rows] == [f.type for f in results]
+    assert sum(float(rows[0][name]) for name in results[0].types) == pytest.approx(1.0, abs=1e-3)
+
+
+def test_one_bad_file_does_not_stop_the_others_and_the_exit_code_tells(tmp_path):
+    write_cloud(tmp_path / "good.xyz", 1)
+    np.savetxt(tmp_path / "few.xyz", np.random.default_rng(0).random((5, 3)))
+    arguments = [
+        str(tmp_path / "few.xyz"),
+        str(tmp_path / "good.xyz"),
+        "--out",
+        str(tmp_path / "out.laz"),
+    ]
+    result = CliRunner().invoke(import_command("segment"), arguments)
+    assert result.exit_code == 1
+    assert "at least 10 points" in result.output
+    assert len((tmp_path / "out.csv").read_text().splitlines()) == 2
+
+
+def test_nothing_to_label_and_wrong_names_are_refused(tmp_path):
+    np.savetxt(tmp_path / "few.xyz", np.random.default_rng(0).random((5, 3)))
+    with pytest.raises(InputError, match="at least one building"):
+        segment_files([tmp_path / "few.xyz"], tmp_path / "out.laz", Settings())
+    with pytest.raises(OutputError, match="laz"):
+        segment_files([tmp_path / "few.xyz"], tmp_path / "out.txt", Settings())

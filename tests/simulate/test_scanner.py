@@ -1,6 +1,4 @@
-"""The simulated scanner: points lie on the truth, in the number asked for, with the
-right labels.
-"""
+"""The simulated scanner: points lie on the truth, as many as asked for, with the right labels."""
 
 import dataclasses
 
@@ -113,9 +111,8 @@ def test_heading_changes_no_label():
         )
         if heading == 0.0:
             first = cloud
-        assert np.array_equal(cloud.label, first.label) and np.array_equal(
-            cloud.source, first.source
-        )
+        assert np.array_equal(cloud.label, first.label)
+        assert np.array_equal(cloud.source, first.source)
         nadir = make_beams(
             np.random.default_rng(4), Swath(heading, 0.5, 0.4, 0.0), np.zeros(2), 12.0, 0.0
         )
@@ -142,9 +139,8 @@ def test_seeds_reproduce(seed):
     for _ in range(2):
         rng = np.random.default_rng(seed)
         clouds.append(scan(random_building(rng), rng))
-    assert np.array_equal(clouds[0].points, clouds[1].points) and np.array_equal(
-        clouds[0].label, clouds[1].label
-    )
+    assert np.array_equal(clouds[0].points, clouds[1].points)
+    assert np.array_equal(clouds[0].label, clouds[1].label)
 
 
 def test_defects_all_happen_and_none_happens_without_them():

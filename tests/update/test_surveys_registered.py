@@ -28,9 +28,8 @@ def scan(rng, roof, density=8.0):
 
 
 def draw_samples(seed, rises, shift=(0.0, 0.0, 0.0), has_ground=True, tilt=0.0, slopes=None):
-    """Roofs that rose by `rises`, in surveys that lie beside each other by `shift`.
-
-    `slopes` (n, 2) are those of the ground around them.
+    """Roofs that rose by `rises`, in surveys that lie beside each other by `shift`. `slopes` (n, 2)
+    are those of the ground around them.
     """
     rng, samples = np.random.default_rng(seed), []
     slopes = np.zeros((len(rises), 2)) if slopes is None else slopes

@@ -341,9 +341,8 @@ def test_a_town_that_rose_and_a_survey_without_ground_are_not_taken_for_a_shift_
     raised = second.xyz[roofs] + [0.0, 0.0, 0.6]
     later = str(write_cloud(tmp_path / "later.laz", raised, second.classification[roofs]))
     request = make_request(tmp_path / "run", later, tmp_path / "auto")
-    with pytest.warns(
-        UserWarning, match=r"shift of \+0\.60 m in height rests on roofs alone \(8 of"
-    ):
+    remark = r"shift of \+0\.60 m in height rests on roofs alone \(8 of"
+    with pytest.warns(UserWarning, match=remark):
         update_area(request)
     request = dataclasses.replace(request, out=tmp_path / "off")
     by_change = update_area(request, changes={"read": {"shift": "off"}}).by_change

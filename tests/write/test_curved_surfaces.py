@@ -23,25 +23,20 @@ HEIGHT_M, WIDTH_M = 3.0, 6.0
 
 def build_tower(kind="cone"):
     """Build a flat block with a curved roof on a round tower."""
-    shape = CATALOGUE[kind]
+    shape, place = CATALOGUE[kind], [10.0, 5.0, 8.0]
     parameters = shape.typical(WIDTH_M, WIDTH_M, HEIGHT_M)
-    part = shape.variant(parameters).part(
-        shape.to_theta(parameters, 0.0, (10.0, 5.0, 8.0)), {"height": 0.1}
-    )
-    block, plan = shapely.box(0.0, 0.0, 20.0, 10.0), part.pieces[0].outline
-    rest = shapely.difference(block, plan)
+    theta = shape.to_theta(parameters, 0.0, place)
+    plan = shape.variant(parameters).part(theta, {"height": 0.1}).pieces[0].outline
+    block = shapely.box(0.0, 0.0, 20.0, 10.0)
     flat = {"type": "flat", "parameters": {}, "position": [0, 0, 5]}
-    parts = [
-        flat | {"outlines": [rings(rest)]},
-        {
-            "type": kind,
-            "parameters": parameters,
-            "position": [10.0, 5.0, 8.0],
-            "outlines": [rings(plan)],
-        },
-    ]
+    top = {"type": kind, "parameters": parameters, "position": place}
+    parts = [flat | {"outlines": [rings(block - plan)]}, top | {"outlines": [rings(plan)]}]
     place = {"origin": [85000, 446000, 2], "outline": rings(block), "z_ground": 2}
     return hiproof.build({"id": kind, **place, "parts": parts})
+
+
+def count_polygons(surface):
+    return len(find(surface, ".//gml:Polygon"))
 
 
 def rings(polygon):
@@ -61,19 +56,13 @@ def find(element, path):
 
 def test_facets_of_a_cone_are_one_roof_surface_of_citygml(folder):
     root = etree.parse(folder / "buildings.gml").getroot()
-    cone, broach = find(root, "//bldg:Building")
-    counts = [
-        sorted(len(find(surface, ".//gml:Polygon")) for surface in find(b, ".//bldg:RoofSurface"))
-        for b in (cone, broach)
-    ]
-    assert counts == [[1, 16], [1] * 9]
-    *_, curved = sorted(
-        find(cone, ".//bldg:RoofSurface"), key=lambda s: len(find(s, ".//gml:Polygon"))
-    )
-    slope = find(curved, "./gen:doubleAttribute[@name='slope']/gen:value/text()")
+    surfaces = [find(building, ".//bldg:RoofSurface") for building in find(root, "//bldg:Building")]
+    cone, broach = (sorted(roof, key=count_polygons) for roof in surfaces)
+    assert [[count_polygons(s) for s in roof] for roof in (cone, broach)] == [[1, 16], [1] * 9]
+    slope = find(cone[-1], "./gen:doubleAttribute[@name='slope']/gen:value/text()")
     apothem = CATALOGUE["cone"].rim[0][0] * WIDTH_M / 2
     assert float(slope[0]) == pytest.approx(np.degrees(np.arctan2(HEIGHT_M, apothem)), abs=0.1)
-    assert not find(curved, "./gen:doubleAttribute[@name='azimuth']")
+    assert not find(cone[-1], "./gen:doubleAttribute[@name='azimuth']")
 
 
 def test_every_link_of_the_solid_leads_to_a_polygon(folder):
@@ -100,17 +89,12 @@ def test_facets_of_a_cone_refer_to_one_surface_of_cityjson(folder):
     _, cone, broach = read_lines(folder)
     numbers = []
     for feature in (cone, broach):
-        solid = next(
-            g for g in feature["CityObjects"][feature["id"]]["geometry"] if g["type"] == "Solid"
-        )
-        semantics = solid["semantics"]
-        roofs = [
-            value
-            for value in semantics["values"][0]
-            if semantics["surfaces"][value]["type"] == "RoofSurface"
-        ]
+        geometries = feature["CityObjects"][feature["id"]]["geometry"]
+        (semantics,) = (g["semantics"] for g in geometries if g["type"] == "Solid")
+        surfaces, values = semantics["surfaces"], semantics["values"][0]
+        roofs = [value for value in values if surfaces[value]["type"] == "RoofSurface"]
         numbers.append(sorted(Counter(roofs).values()))
-        curved = [s for s in semantics["surfaces"] if s.get("hiproof_part_type") == feature["id"]]
+        curved = [s for s in surfaces if s.get("hiproof_part_type") == feature["id"]]
         assert all(surface["hiproof_part"] == 1 for surface in curved)
     assert numbers == [[1, 16], [1] * 9]
 

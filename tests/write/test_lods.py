@@ -43,31 +43,15 @@ IN_PARTS = WriteSettings(lods=ALL, parts_as="buildingparts", roof_codes="adv")
 
 def terrace(id="terrace"):
     """A gable beside a lower flat roof, which meet at a wall."""
-    planes = np.array([[0.0, 0.5, 4.0], [0.0, -0.5, 8.0]])
-    gable = Part(
-        *("gable", (Piece(shapely.box(0, 0, 6, 8), planes),)),
-        *({"width": 8.0, "length": 6.0, "height": 2.0}, 0.0, np.array([3.0, 4.0, 4.0])),
-    )
-    flat = Part(
-        "flat",
-        (Piece(shapely.box(6, 0, 10, 8), np.array([[0.0, 0.0, 3.0]])),),
-        {},
-        0.0,
-        np.array([8, 4, 3.0]),
-    )
+    slopes, level = np.array([[0.0, 0.5, 4.0], [0.0, -0.5, 8.0]]), np.array([[0.0, 0.0, 3.0]])
+    size = {"width": 8.0, "length": 6.0, "height": 2.0}
+    pieces = Piece(shapely.box(0, 0, 6, 8), slopes), Piece(shapely.box(6, 0, 10, 8), level)
+    gable = Part("gable", pieces[:1], size, 0.0, np.array([3.0, 4.0, 4.0]))
+    flat = Part("flat", pieces[1:], {}, 0.0, np.array([8, 4, 3.0]))
     roof = Roof((gable, flat), shapely.box(0, 0, 10, 8), LocalFrame(RD_ORIGIN))
     line = np.array([[0, 0, 0.2], [10, 0, 0.0], [10, 8, 0.1], [0, 0, 0.2]]) + RD_ORIGIN
-    solid = compose(roof, 0.0).move(RD_ORIGIN)
-    return Building(
-        id,
-        Status.MODELLED,
-        "",
-        Model(roof, solid),
-        Quality(points=99),
-        0.0,
-        "ground class",
-        (line,),
-    )
+    model, quality = Model(roof, compose(roof, 0.0).move(RD_ORIGIN)), Quality(points=99)
+    return Building(id, Status.MODELLED, "", model, quality, 0.0, "ground class", (line,))
 
 
 def gml(tmp_path, buildings, write):
@@ -112,10 +96,8 @@ def test_levels_of_detail_have_the_heights_that_the_rule_says(tmp_path):
     figures = roof_figures(building.solid)
     city_object = objects(tmp_path, [building], WHOLE)["terrace"]
     assert lods(city_object) == ["0", "0", "1.2", "1.3", "2.2"]
-    kinds = [
-        geometry["semantics"]["surfaces"][0]["type"] for geometry in city_object["geometry"][:2]
-    ]
-    assert kinds == ["GroundSurface", "RoofSurface"]
+    semantics = [geometry["semantics"]["surfaces"][0] for geometry in city_object["geometry"][:2]]
+    assert [surface["type"] for surface in semantics] == ["GroundSurface", "RoofSurface"]
     block, steps, roof = (solid for _, solid in read_solids(tmp_path / "a.city.jsonl"))
     assert block.volume == pytest.approx(80 * figures.h_70p, rel=1e-4)
     # of a gable's heights over the plan, which are spread evenly from eave to ridge
@@ -126,64 +108,45 @@ def test_levels_of_detail_have_the_heights_that_the_rule_says(tmp_path):
 
 def test_citygml_has_each_level_in_its_property(tmp_path):
     root = gml(tmp_path, [terrace()], WHOLE)
+
+    def list_heights(name):
+        rings = find(root, f"//bldg:{name}//gml:posList/text()")
+        return {z for ring in rings for z in ring.split()[2::3]}
+
     for name in ("lod0FootPrint", "lod0RoofEdge", "lod1Solid", "lod2Solid"):
         assert len(find(root, f"//bldg:Building/bldg:{name}")) == 1
-    heights = [
-        find(root, f"//bldg:{name}//gml:posList/text()")[0].split()[2::3]
-        for name in ("lod0FootPrint", "lod0RoofEdge")
-    ]
-    assert set(heights[0]) == {"0.0000"} and set(heights[1]) == {
-        f"{roof_figures(terrace().solid).h_eave:.4f}"
-    }
-    z = [
-        float(z)
-        for text in find(root, "//bldg:lod1Solid//gml:posList/text()")
-        for z in text.split()[2::3]
-    ]
+    assert list_heights("lod0FootPrint") == {"0.0000"}
+    assert list_heights("lod0RoofEdge") == {f"{roof_figures(terrace().solid).h_eave:.4f}"}
     # the finer LoD1: the two blocks' tops
-    assert sorted(set(z)) == pytest.approx([0.0, 3.0, 5.4], abs=0.01)
+    tops = sorted(map(float, list_heights("lod1Solid")))
+    assert tops == pytest.approx([0.0, 3.0, 5.4], abs=0.01)
 
 
 def test_eaves_are_where_roofs_end():
     assert roof_figures(gable_house(eave=3.0, ridge=7.0)).h_eave == pytest.approx(3.0, abs=1e-3)
-    # a quantile by length:
-    assert roof_figures(terrace().solid).h_eave == pytest.approx(
-        3.0, abs=1e-3
-    )  # 16 m of the flat roof's edge, 12 m of the gable's, at 4 m
+    # a quantile by length: 16 m of the flat roof's edge, 12 m of the gable's, at 4 m
+    assert roof_figures(terrace().solid).h_eave == pytest.approx(3.0, abs=1e-3)
 
 
 def test_building_parts_have_solids_types_heights_and_parameters(tmp_path):
     by_id = objects(tmp_path, [terrace()], IN_PARTS)
     whole, gable, flat = by_id["terrace"], by_id["terrace-part1"], by_id["terrace-part2"]
-    assert whole["children"] == ["terrace-part1", "terrace-part2"] and gable["parents"] == flat[
-        "parents"
-    ] == ["terrace"]
+    assert whole["children"] == ["terrace-part1", "terrace-part2"]
+    assert gable["parents"] == flat["parents"] == ["terrace"]
     assert lods(whole) == ["0", "0", "1.2"] and lods(gable) == lods(flat) == ["1.3", "2.2"]
-    assert (
-        gable["attributes"]["rf_volume_lod22"] == pytest.approx(240.0)
-        and flat["attributes"]["rf_h_roof_max"] == 3.0
-    )
+    assert gable["attributes"]["rf_volume_lod22"] == pytest.approx(240.0)
+    assert flat["attributes"]["rf_h_roof_max"] == 3.0
     (primitive,) = gable["attributes"]["hiproof_primitives"]
-    assert (primitive["type"], primitive["width"], primitive["height"], primitive["z_eave"]) == (
-        "gable",
-        8.0,
-        2.0,
-        4.0,
-    )
+    expected = {"type": "gable", "width": 8.0, "height": 2.0, "z_eave": 4.0}
+    assert {name: primitive[name] for name in expected} == expected
     root = gml(tmp_path, [terrace()], IN_PARTS)
     parts = find(root, "//bldg:consistsOfBuildingPart/bldg:BuildingPart")
-    assert [part.xpath("bldg:roofType/text()", namespaces=NAMESPACES) for part in parts] == [
-        ["3100"],
-        ["1000"],
-    ]
-    assert [part.xpath("bldg:measuredHeight/text()", namespaces=NAMESPACES) for part in parts] == [
-        ["6.0000"],
-        ["3.0000"],
-    ]
+    assert [find(part, "bldg:roofType/text()") for part in parts] == [["3100"], ["1000"]]
+    heights = [find(part, "bldg:measuredHeight/text()") for part in parts]
+    assert heights == [["6.0000"], ["3.0000"]]
     assert set(find(root, "//bldg:roofType/@codeSpace")) == {CODE_SPACES["adv"]}
-    assert find(
-        parts[0], "gen:genericAttributeSet/gen:doubleAttribute[@name='width']/gen:value/text()"
-    ) == ["8.0"]
+    width = "gen:genericAttributeSet/gen:doubleAttribute[@name='width']/gen:value/text()"
+    assert find(parts[0], width) == ["8.0"]
     ids = find(root, "//@gml:id")
     assert len(set(ids)) == len(ids)
 
@@ -194,46 +157,39 @@ def test_whoever_reads_models_gets_the_whole_building_at_its_finest(tmp_path, wr
     objects(tmp_path, [building, make_building(gable_house(), "house")], write)
     model, house = read_models(tmp_path / "a.city.jsonl")
     assert (model.id, house.id) == ("terrace", "house")
-    assert check_solid(model.solid, 0.01) == () and model.solid.volume == pytest.approx(
-        building.solid.volume, rel=1e-4
-    )
+    assert check_solid(model.solid, 0.01) == ()
+    assert model.solid.volume == pytest.approx(building.solid.volume, rel=1e-4)
     for face in model.solid.select_faces(ROOF):
         x, y, z = ring_normal(model.solid.vertices[list(face.rings[0])])
         assert model.part_types[face.part] == ("gable" if np.hypot(x, y) > 0.1 * z else "flat")
 
 
 def test_a_files_head_says_how_it_is_drawn_and_a_build_obeys_it_or_options(tmp_path):
+    one, two, three = (tmp_path / name for name in ("one", "two", "three"))
     write_parameters(tmp_path / "p.jsonl", [terrace()], head=FileHead("EPSG:7415", write=IN_PARTS))
-    build_file(tmp_path / "p.jsonl", tmp_path / "one")
-    build_file(tmp_path / "one/parameters.jsonl", tmp_path / "two")
+    build_file(tmp_path / "p.jsonl", one)
+    build_file(one / "parameters.jsonl", two)
     for name in ("buildings.gml", "buildings.city.jsonl", "parameters.jsonl", "buildings.gpkg"):
-        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes(), (
-            name
-        )
-    assert b"BuildingPart" in (tmp_path / "two/buildings.city.jsonl").read_bytes()
-    build_file(
-        tmp_path / "p.jsonl",
-        tmp_path / "three",
-        changes={"write": {"parts_as": "one", "lods": ["1.2"]}},
-    )
-    (feature,) = (tmp_path / "three/buildings.city.jsonl").read_text().splitlines()[1:]
+        assert (one / name).read_bytes() == (two / name).read_bytes(), name
+    assert b"BuildingPart" in (two / "buildings.city.jsonl").read_bytes()
+    changes = {"write": {"parts_as": "one", "lods": ["1.2"]}}
+    build_file(tmp_path / "p.jsonl", three, changes=changes)
+    (feature,) = (three / "buildings.city.jsonl").read_text().splitlines()[1:]
     (city_object,) = json.loads(feature)["CityObjects"].values()
     assert lods(city_object) == ["0", "1.2"]
 
 
 @pytest.mark.parametrize("write", [WriteSettings(), WHOLE], ids=["default", "all levels"])
 def test_gdal_reads_a_building_as_its_surfaces(tmp_path, write):
-    building = terrace()
-    root = gml(tmp_path, [building, make_building(gable_house(), "house")], write)
+    solid = terrace().solid
+    root = gml(tmp_path, [terrace(), make_building(gable_house(), "house")], write)
     assert len(find(root, "//bldg:lod1TerrainIntersection")) == 2
     assert pyogrio.read_info(tmp_path / "a.gml")["geometry_type"] == "MultiPolygon Z"
     _, _, shapes, _ = pyogrio.raw.read(tmp_path / "a.gml")
     faces = shapely.get_parts(shapely.from_wkb(shapes[0]))
-    assert len(faces) == len(building.solid.faces)
-    assert (
-        max(shapely.get_coordinates(faces, include_z=True)[:, 2])
-        == building.solid.vertices[:, 2].max()
-    )
+    assert len(faces) == len(solid.faces)
+    heights = shapely.get_coordinates(faces, include_z=True)[:, 2]
+    assert max(heights) == solid.vertices[:, 2].max()
 
 
 def test_without_surfaces_by_value_the_line_is_that_of_the_solids_level(tmp_path):
@@ -247,41 +203,30 @@ def test_without_surfaces_by_value_the_line_is_that_of_the_solids_level(tmp_path
 
 
 def test_a_geopackage_is_of_an_old_version_and_brings_a_style_for_each_layer(tmp_path):
-    write_attributes(tmp_path / "a.gpkg", [terrace(), make_lost_building()], "EPSG:7415")
-    with sqlite3.connect(tmp_path / "a.gpkg") as file:
+    path, columns = tmp_path / "a.gpkg", "f_table_name, f_geometry_column, useAsDefault, styleQML"
+    write_attributes(path, [terrace(), make_lost_building()], "EPSG:7415")
+    with sqlite3.connect(path) as file:
         assert file.execute("pragma user_version").fetchone() == (10200,)
-        styles = file.execute(
-            f"select f_table_name, f_geometry_column, useAsDefault, styleQML from {TABLE}"
-        ).fetchall()
-    layers = {
-        name: geometry
-        for name, geometry in pyogrio.list_layers(tmp_path / "a.gpkg")
-        if name != TABLE
-    }
-    assert [row[:3] for row in styles] == [
-        (style.layer, "geom", int(style.is_default)) for style in STYLES
-    ]
-    assert [style.layer for style in STYLES if style.is_default] == list(layers)
+        styles = file.execute(f"select {columns} from {TABLE}").fetchall()
+        kind, entry = file.execute(f"select type, {STYLES[1].expression} from parts").fetchone()
+    assert entry == list_legend(kind) and ROOF_COLOURS[entry] == type_colour(kind)
+    expected = [(style.layer, "geom", int(style.is_default)) for style in STYLES]
+    assert [row[:3] for row in styles] == expected
+    layers = [name for name, _ in pyogrio.list_layers(path) if name != TABLE]
+    assert [style.layer for style in STYLES if style.is_default] == layers
     for (name, _, _, qml), style in zip(styles, STYLES, strict=True):
         renderer = etree.fromstring(qml.encode()).find("renderer-v2")
         columns = set(re.findall('"([^"]+)"', renderer.get("attr"))) or {renderer.get("attr")}
-        assert columns <= set(pyogrio.read_info(tmp_path / "a.gpkg", layer=name)["fields"])
+        assert columns <= set(pyogrio.read_info(path, layer=name)["fields"])
         assert len(renderer.findall("symbols/symbol")) == len(style.colours)
-    with sqlite3.connect(tmp_path / "a.gpkg") as file:
-        kind, entry = file.execute(f"select type, {STYLES[1].expression} from parts").fetchone()
-    assert entry == list_legend(kind) and ROOF_COLOURS[entry] == type_colour(kind)
 
 
 @pytest.mark.parametrize(
     ("lods", "grounds"), [(("0",), 0), (("0", "1.2"), 1), (("1.3",), 1), (("2.2",), 1)]
 )
 def test_a_building_in_parts_is_read_as_one_shell_at_every_level(tmp_path, lods, grounds):
-    write_cityjson(
-        tmp_path / "buildings.city.jsonl",
-        [terrace()],
-        "EPSG:7415",
-        write=replace(IN_PARTS, lods=lods),
-    )
+    write = replace(IN_PARTS, lods=lods)
+    write_cityjson(tmp_path / "buildings.city.jsonl", [terrace()], "EPSG:7415", write=write)
     (building,) = open_run(tmp_path)
     assert len(building.solid.select_faces(GROUND) if building.built else ()) == grounds
 

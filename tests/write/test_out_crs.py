@@ -55,18 +55,16 @@ def buildings_at(origin):
 @pytest.mark.parametrize("way", WAYS)
 def test_coordinates_come_back_within_a_millimetre(way):
     crs, out, origin = WAYS[way]
-    places = np.array(origin) + np.random.default_rng(0).uniform(
-        (-5e3, -5e3, -3), (5e3, 5e3, 90), (500, 3)
-    )
-    for units in (FileUnits.of(crs, out_crs=out).gml, FileUnits.of(crs, out_crs=out).cityjson):
+    spread = np.random.default_rng(0).uniform((-5e3, -5e3, -3), (5e3, 5e3, 90), (500, 3))
+    places, files = np.array(origin) + spread, FileUnits.of(crs, out_crs=out)
+    for units in (files.gml, files.cityjson):
         places_back = units.from_metres(places)
         assert np.abs(units.to_metres(places_back) - places).max() < 1e-3
         assert np.abs(places_back[:, :2] - places[:, :2]).max() > 100.0
         # a plan goes as a place does
         assert np.array_equal(units.from_metres(places[:, :2]), places_back[:, :2])
-        assert units.from_metres(places[0]) == pytest.approx(
-            places_back[0]
-        ) and units.height * places_back[:, 2] == pytest.approx(places[:, 2], abs=1e-3)
+        assert units.from_metres(places[0]) == pytest.approx(places_back[0])
+        assert units.height * places_back[:, 2] == pytest.approx(places[:, 2], abs=1e-3)
 
 
 @pytest.mark.parametrize("way", WAYS)
@@ -74,9 +72,7 @@ def test_solids_stay_valid_and_their_walls_upright(way):
     crs, out, origin = WAYS[way]
     units = FileUnits.of(crs, out_crs=out).gml
     for building in buildings_at(origin):
-        assert building_attributes(building, units=units)["hiproof_iso19107_lod22"] == "[]", (
-            building.id
-        )
+        assert building_attributes(building, units=units)["hiproof_iso19107_lod22"] == "[]"
         old, new = building.solid.vertices, units.from_metres(building.solid.vertices)
         for face in building.solid.select_faces(WALL):
             ring = list(face.rings[0])
@@ -102,95 +98,67 @@ def town(tmp_path_factory):
     cloud = str(write_cloud(folder / "cloud.laz", town.xyz, town.classification, "EPSG:7415"))
     footprints = str(write_footprints(folder / "footprints.gpkg", town.footprints, "EPSG:28992"))
     for name, out_crs in (("here", ""), ("there", "EPSG:25831")):
-        settings = Settings.from_dict(
-            {"write": {"out_crs": out_crs, "lods": ["0", "2.2"], "citygml": "both"}}
-        )
-        assert (
-            reconstruct_area(
-                Request((cloud,), folder / name, footprints, settings=settings)
-            ).exit_code
-            == 0
-        )
+        write = {"out_crs": out_crs, "lods": ["0", "2.2"], "citygml": "both"}
+        settings = Settings.from_dict({"write": write})
+        request = Request((cloud,), folder / name, footprints, settings=settings)
+        assert reconstruct_area(request).exit_code == 0
     return folder
 
 
 def gml_places(path):
     """All places (n, 3) of a GML file, and the CRS it names."""
     root = etree.parse(path)
-    numbers = np.array(
-        " ".join(node.text for node in root.iter("{*}posList")).split(), float
-    ).reshape(-1, 3)
-    return numbers, next(root.iter("{*}Envelope")).get("srsName")
+    text = " ".join(node.text for node in root.iter("{*}posList"))
+    places = np.array(text.split(), float).reshape(-1, 3)
+    return places, next(root.iter("{*}Envelope")).get("srsName")
 
 
 def test_all_files_stand_in_the_same_place(town):
     units = FileUnits.of("EPSG:7415", out_crs="EPSG:25831")
+
+    def assert_near(back, places):
+        assert np.abs(back - places).max() < 1e-3
+
     for name in ("buildings.gml", "buildings.citygml3.gml"):
-        first, second = (gml_places(town / run / name) for run in ("here", "there"))
-        assert np.abs(units.gml.to_metres(second[0]) - first[0]).max() < 1e-3
-        assert second[1] == "urn:ogc:def:crs,crs:EPSG::25831,crs:EPSG::5709"
+        (here, _), (there, crs) = (gml_places(town / run / name) for run in ("here", "there"))
+        assert_near(units.gml.to_metres(there), here)
+        assert crs == "urn:ogc:def:crs,crs:EPSG::25831,crs:EPSG::5709"
     runs = [list(read_models(town / run / "buildings.city.jsonl")) for run in ("here", "there")]
     for item, other in zip(*runs, strict=True):
-        assert (
-            np.abs(units.cityjson.to_metres(other.solid.vertices) - item.solid.vertices).max()
-            < 1e-3
-        )
+        assert_near(units.cityjson.to_metres(other.solid.vertices), item.solid.vertices)
         assert item.solid.faces == other.solid.faces
     for layer in ("buildings", "parts", "roof_surfaces"):
-        metas, shapes = zip(
-            *(table(town / run / "buildings.gpkg", layer) for run in ("here", "there")), strict=True
-        )
-        moved = shapely.get_coordinates(shapes[1], include_z=layer == "roof_surfaces")
-        assert (
-            np.abs(
-                units.gml.to_metres(moved)
-                - shapely.get_coordinates(shapes[0], include_z=moved.shape[1] == 3)
-            ).max()
-            < 1e-3
-        )
-        assert metas[1]["crs"] == "EPSG:25831"
+        tables = [read_table(town / run / "buildings.gpkg", layer) for run in ("here", "there")]
+        assert_near(units.gml.to_metres(tables[1][1]), tables[0][1])
+        assert tables[1][0] == "EPSG:25831"
 
 
-def table(path, layer):
+def read_table(path, layer):
+    """The CRS of a layer and all its coordinates, with heights where it has them."""
     meta, _, wkb, _ = pyogrio.raw.read(path, layer=layer)
-    return meta, shapely.from_wkb(wkb)
+    shapes = shapely.from_wkb(wkb)
+    return meta["crs"], shapely.get_coordinates(shapes, include_z=layer == "roof_surfaces")
 
 
 def test_parameters_stay_in_the_clouds_crs_and_build_the_same_bytes(town, tmp_path):
-    first, second = (
-        (town / run / "parameters.jsonl").read_bytes().split(b"\n") for run in ("here", "there")
-    )
-    assert first[1:] == second[1:]
-    build_file(town / "there/parameters.jsonl", tmp_path / "again")
-    for name in (
-        "buildings.gml",
-        "buildings.citygml3.gml",
-        "buildings.city.jsonl",
-        "parameters.jsonl",
-    ):
-        assert (tmp_path / "again" / name).read_bytes() == (town / "there" / name).read_bytes(), (
-            name
-        )
-    build_file(
-        town / "here/parameters.jsonl",
-        tmp_path / "moved",
-        changes={"write": {"out_crs": "EPSG:25831"}},
-    )
-    for name in ("buildings.gml", "buildings.city.jsonl"):
-        assert (tmp_path / "moved" / name).read_bytes() == (town / "there" / name).read_bytes(), (
-            name
-        )
+    first, second = (town / run / "parameters.jsonl" for run in ("here", "there"))
+    assert first.read_bytes().split(b"\n")[1:] == second.read_bytes().split(b"\n")[1:]
+    build_file(second, tmp_path / "again")
+    build_file(first, tmp_path / "moved", changes={"write": {"out_crs": "EPSG:25831"}})
+    models = ("buildings.gml", "buildings.city.jsonl")
+    all_files = (*models, "buildings.citygml3.gml", "parameters.jsonl")
+    for folder, names in (("again", all_files), ("moved", models)):
+        for name in names:
+            there = (town / "there" / name).read_bytes()
+            assert (tmp_path / folder / name).read_bytes() == there, name
 
 
 def test_models_elsewhere_are_judged_where_their_points_are(town):
     cloud = str(town / "cloud.laz")
-    for first, second in zip(
-        *(evaluate_run(town / run, [cloud]).figures for run in ("here", "there")), strict=True
-    ):
-        assert (
-            second.quality.rmse == pytest.approx(first.quality.rmse, abs=1e-4)
-            and first.quality.points > 50
-        )
+    runs = (evaluate_run(town / run, [cloud]).figures for run in ("here", "there"))
+    for first, second in zip(*runs, strict=True):
+        assert second.quality.rmse == pytest.approx(first.quality.rmse, abs=1e-4)
+        assert first.quality.points > 50
 
 
 def test_what_is_converted_stands_where_the_models_do(town, tmp_path):
@@ -199,13 +167,12 @@ def test_what_is_converted_stands_where_the_models_do(town, tmp_path):
     first, second = ((tmp_path / name).read_text().splitlines() for name in ("a.obj", "b.obj"))
     assert "COMPOUNDCRS" in first[1] and "UTM zone 31N" in first[1]
     assert first[0] == second[0]
-    corners = [
-        np.array([line.split()[1:] for line in lines if line.startswith("v ")], float)
-        for lines in (first, second)
-    ]
-    (low, high), (again_low, again_high) = ((c.min(axis=0), c.max(axis=0)) for c in corners)
-    np.testing.assert_allclose(again_low, low, atol=2e-4)
-    np.testing.assert_allclose(again_high, high, atol=2e-4)
+    vertices = (
+        [line.split()[1:] for line in lines if line[:2] == "v "] for lines in (first, second)
+    )
+    corners, again = (np.array(rows, float) for rows in vertices)
+    for extreme in (np.min, np.max):
+        np.testing.assert_allclose(extreme(again, axis=0), extreme(corners, axis=0), atol=2e-4)
 
 
 def test_the_same_crs_is_no_other(tmp_path):

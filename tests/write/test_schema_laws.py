@@ -33,7 +33,8 @@ def test_cityjson_features_hold_their_object_and_its_vertices(features):
     ids = [feature["id"] for feature in features]
     assert len(set(ids)) == len(ids) == 6
     for feature in features:
-        assert feature["type"] == "CityJSONFeature" and set(feature) == {
+        assert feature["type"] == "CityJSONFeature"
+        assert set(feature) == {
             "type",
             "id",
             "CityObjects",

@@ -36,6 +36,18 @@ PLACES = {  # a place on land in each CRS, in its own unit
 }
 
 
+@pytest.mark.parametrize(
+    ("name", "sentence"),
+    [("a.gpkg", "expected a new folder"), ("photos/a.jpg", "choose another name")],
+)
+def test_what_is_no_tileset_is_left_alone(tmp_path, name, sentence):
+    (tmp_path / name).parent.mkdir(exist_ok=True)
+    (tmp_path / name).write_text("x")
+    with pytest.raises(HiproofError, match=sentence):
+        write_models(tmp_path / name.partition("/")[0], town(2), "EPSG:7415", GEOID_M)
+    assert (tmp_path / name).read_text() == "x"
+
+
 def town(count=60, seed=0):
     """Houses of many sizes over half a kilometre, attributes that are not always known."""
     rng = np.random.default_rng(seed)
@@ -106,13 +118,12 @@ def read_table_rows(document, binary):
     (table,) = extension["propertyTables"]
     columns = {}
     for id, property in extension["schema"]["classes"][table["class"]]["properties"].items():
-        values = view_bytes(document, binary, table["properties"][id]["values"])
+        column = table["properties"][id]
+        values = view_bytes(document, binary, column["values"])
         if property["type"] == "SCALAR":
             columns[property["name"]] = np.frombuffer(values, "<f8").tolist()
         else:
-            ends = np.frombuffer(
-                view_bytes(document, binary, table["properties"][id]["stringOffsets"]), "<u4"
-            )
+            ends = np.frombuffer(view_bytes(document, binary, column["stringOffsets"]), "<u4")
             columns[property["name"]] = [values[a:b].decode() for a, b in pairwise(ends.tolist())]
     assert {len(column) for column in columns.values()} == {table["count"]}
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
@@ -176,10 +187,8 @@ def test_attributes_are_those_of_the_building(tiled_town):
             assert row["half known"] == (
                 NO_NUMBER if attributes["half known"] is None else attributes["half known"]
             )
-            assert (
-                row["name"] == (attributes["name"] or "")
-                and row["flag"] == str(attributes["flag"]).lower()
-            )
+            assert row["name"] == (attributes["name"] or "")
+            assert row["flag"] == str(attributes["flag"]).lower()
 
 
 def test_a_roof_face_has_the_colour_of_its_part(tmp_path, globe):
@@ -187,16 +196,11 @@ def test_a_roof_face_has_the_colour_of_its_part(tmp_path, globe):
     document, binary = parse_glb(tmp_path / "a.3dtiles/tiles/r.glb")
     names = document["meshes"][0]["primitives"][0]["attributes"]
     upward = accessor_values(document, binary, names["NORMAL"])[:, 1]
-    painted = {
-        tuple(c)
-        for c in accessor_values(document, binary, names["COLOR_0"])[
-            (upward > 0.1) & (upward < 0.9)
-        ].tolist()
-    }
-    assert painted == {
-        (*(round(255 * part) for part in linear_rgb(type_colour(kind))), 255)
-        for kind in ("gable", "hip")
-    }
+    colours = accessor_values(document, binary, names["COLOR_0"])
+    painted = colours[(upward > 0.1) & (upward < 0.9)].tolist()
+    types = [linear_rgb(type_colour(kind)) for kind in ("gable", "hip")]
+    expected = {(*(round(255 * part) for part in rgb), 255) for rgb in types}
+    assert set(map(tuple, painted)) == expected
 
 
 def test_boxes_hold_what_is_drawn_in_them_and_below(tiled_town):
@@ -310,21 +314,6 @@ def test_a_failure_leaves_the_older_tileset(tmp_path):
         write_models(folder, [*town(3), nowhere], "EPSG:7415", GEOID_M)
     assert (folder / "tiles" / "r.glb").read_bytes() == content
     assert [file.name for file in tmp_path.iterdir()] == ["a.3dtiles"]
-
-
-def test_a_file_of_that_name_is_left_alone(tmp_path):
-    (tmp_path / "a.gpkg").write_text("x")
-    with pytest.raises(HiproofError, match="expected a new folder"):
-        write_models(tmp_path / "a.gpkg", town(2), "EPSG:7415", GEOID_M)
-    assert (tmp_path / "a.gpkg").read_text() == "x"
-
-
-def test_a_folder_of_something_else_is_left_alone(tmp_path):
-    (tmp_path / "photos").mkdir()
-    (tmp_path / "photos" / "a.jpg").write_text("x")
-    with pytest.raises(HiproofError, match="choose another name"):
-        write_models(tmp_path / "photos", town(2), "EPSG:7415", GEOID_M)
-    assert (tmp_path / "photos" / "a.jpg").read_text() == "x"
 
 
 def test_no_solids_are_told(tmp_path):

@@ -21,15 +21,14 @@ GML_ID, HREF = f"{{{NAMESPACES['gml']}}}id", f"{{{NAMESPACES['xlink']}}}href"
 
 
 def street():
+    odd = replace(make_building(box()).quality, psd_mean=float("inf"))
     return [
         make_lost_building(),
         make_building(gable_house(), "0503100000012345"),
         make_building(courtyard(), "a b/ä", ("flat", "hip")),
         make_building(box(), "same"),
         make_building(box(), "same", terrain_intersection=()),
-        make_building(
-            box(), "same-1", quality=replace(make_building(box()).quality, psd_mean=float("inf"))
-        ),
+        make_building(box(), "same-1", quality=odd),
     ]
 
 
@@ -52,22 +51,14 @@ def schema():
     "buildings", [street(), [], [make_lost_building()]], ids=["street", "none", "no model"]
 )
 def test_valid_by_the_schema(tmp_path, schema, buildings, crs):
-    schema.assertValid(
-        write_and_read(
-            tmp_path, buildings, crs, creation_date=datetime.date(2020, 2, 3)
-        ).getroottree()
-    )
+    date = datetime.date(2020, 2, 3)
+    root = write_and_read(tmp_path, buildings, crs, creation_date=date)
+    schema.assertValid(root.getroottree())
 
 
 def test_strange_attributes_are_valid(tmp_path, schema):
-    strange = {
-        "\x00": "\x01ok\ud800",
-        "<": 10**30,
-        "flag": True,
-        "when": datetime.date(2020, 1, 2),
-        "list": [1],
-        "": 0.5,
-    }
+    strange = {"\x00": "\x01ok\ud800", "<": 10**30, "flag": True, "list": [1], "": 0.5}
+    strange["when"] = datetime.date(2020, 1, 2)
     root = write_and_read(tmp_path, [make_building(box(), "\x02", attributes=strange)])
     schema.assertValid(root.getroottree())
     assert find(root, "//gen:stringAttribute[@name='flag']/gen:value/text()") == ["true"]
@@ -115,48 +106,42 @@ def test_ids_are_unique_and_links_lead_somewhere(tmp_path):
 )
 def test_roof_type(tmp_path, kinds, code):
     """A slope of the house belongs to each part."""
-    house = gable_house()
-    roof = itertools.cycle(range(len(kinds)))
-    faces = tuple(
-        replace(face, part=next(roof)) if face.kind == "RoofSurface" else face
-        for face in house.faces
-    )
-    (element,) = find(
-        write_and_read(tmp_path, [make_building(replace(house, faces=faces), kinds=kinds)]),
-        "//bldg:roofType",
-    )
+    house, roof = gable_house(), itertools.cycle(range(len(kinds)))
+    faces = [replace(f, part=next(roof)) if f.kind == "RoofSurface" else f for f in house.faces]
+    building = make_building(replace(house, faces=tuple(faces)), kinds=kinds)
+    (element,) = find(write_and_read(tmp_path, [building]), "//bldg:roofType")
     assert element.text == code
     assert element.get("codeSpace").endswith("_AbstractBuilding_roofType.xml")
 
 
 def test_heights_attributes_and_date(tmp_path):
-    root = write_and_read(
-        tmp_path, [make_building(gable_house())], creation_date=datetime.date(2020, 2, 3)
-    )
+    date = datetime.date(2020, 2, 3)
+    root = write_and_read(tmp_path, [make_building(gable_house())], creation_date=date)
+
+    def find_values(kind, name):
+        return find(root, f"//gen:{kind}Attribute[@name='{name}']/gen:value/text()")
+
     assert find(root, "//bldg:measuredHeight[@uom='m']/text()") == ["7.0000"]
     assert find(root, "//core:creationDate/text()") == ["2020-02-03"]
-    assert find(root, "//gen:doubleAttribute[@name='rf_h_roof_ridge']/gen:value/text()") == ["7.0"]
-    assert find(root, "//gen:stringAttribute[@name='naam']/gen:value/text()") == ["Café <&>"]
-    assert find(
-        root, "//bldg:RoofSurface/gen:doubleAttribute[@name='azimuth']/gen:value/text()"
-    ) == ["270.0", "90.0"]
+    assert find_values("double", "rf_h_roof_ridge") == ["7.0"]
+    assert find_values("string", "naam") == ["Café <&>"]
+    assert find_values("double", "azimuth") == ["270.0", "90.0"]
+
+
+def read_rings(texts):
+    return [np.array(text.split(), float).reshape(-1, 3) for text in texts]
 
 
 def test_polygons_are_the_solid(tmp_path):
     solid = courtyard()
     root = write_and_read(tmp_path, [make_building(solid)])
     polygons = find(root, "//bldg:boundedBy//gml:Polygon")
-    assert len(polygons) == len(solid.faces)
     for polygon, face in zip(polygons, solid.faces, strict=True):
-        rings = [
-            np.array(text.split(), float).reshape(-1, 3)
-            for text in find(polygon, ".//gml:posList/text()")
-        ]
+        rings = read_rings(find(polygon, ".//gml:posList/text()"))
         assert len(rings) == len(face.rings) == len(find(polygon, "gml:exterior|gml:interior"))
         for ring, indices in zip(rings, face.rings, strict=True):
-            np.testing.assert_allclose(
-                ring, solid.vertices[[*indices, indices[0]]] + RD_ORIGIN, atol=1e-9
-            )
+            expected = solid.vertices[[*indices, indices[0]]] + RD_ORIGIN
+            np.testing.assert_allclose(ring, expected, atol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -173,11 +158,9 @@ def test_envelope_holds_everything(tmp_path):
     (box_,) = find(root, "/core:CityModel/gml:boundedBy/gml:Envelope")
     assert box_.get("srsName") == "urn:ogc:def:crs,crs:EPSG::28992,crs:EPSG::5709"
     assert box_.get("srsDimension") == "3"
-    lower, upper = (np.array(corner.text.split(), float) for corner in box_)
-    xyz = np.concatenate(
-        [np.array(t.split(), float).reshape(-1, 3) for t in find(root, "//gml:posList/text()")]
-    )
-    np.testing.assert_allclose([lower, upper], [xyz.min(axis=0), xyz.max(axis=0)])
+    corners = [np.array(corner.text.split(), float) for corner in box_]
+    xyz = np.concatenate(read_rings(find(root, "//gml:posList/text()")))
+    np.testing.assert_allclose(corners, [xyz.min(axis=0), xyz.max(axis=0)])
 
 
 @pytest.mark.parametrize("origin", [(1e7, 1e7, -430.0), (-1e7, 12345678.9, 8848.0)])

@@ -35,6 +35,15 @@ TWO_PARTS = """<core:cityObjectMember><bldg:Building gml:id="bldg-x"><gml:name>x
 </bldg:BuildingPart></bldg:consistsOfBuildingPart></bldg:Building></core:cityObjectMember>"""  # noqa: E501
 
 
+def list_attributes(building, version):
+    """(name, value) of each generic attribute of a building of that version."""
+    if version == 2:
+        return [(a.get("name"), a[0].text) for a in building.xpath("gen:*", namespaces=OLD)]
+    found = new(building, "core:genericAttribute/*")
+    texts = ("gen:name", "gen:value")
+    return [tuple(a.findtext(text, None, NAMESPACES_3) for text in texts) for a in found]
+
+
 def street():
     strange = {'a & <b> "c"': "\r\n <ö> 'x'", "flag": True, "n": 3, "x": -0.5, "unknown": None}
     return [
@@ -92,73 +101,49 @@ def test_the_same_solids_come_back(files):
 
 def test_the_same_attributes_stand_in_both(roots):
     old, later = roots
-    old_attributes = [
-        [(a.get("name"), a[0].text) for a in b.xpath("gen:*", namespaces=OLD)]
-        for b in old.iter(f"{{{OLD['bldg']}}}Building")
-    ]
-    new_attributes = [
-        [
-            (
-                a.findtext("gen:name", None, NAMESPACES_3),
-                a.findtext("gen:value", None, NAMESPACES_3),
-            )
-            for a in new(b, "core:genericAttribute/*")
-        ]
-        for b in new(later, "//bldg:Building")
-    ]
-    assert new_attributes == old_attributes and all(old_attributes)
+    old_attributes = [list_attributes(b, 2) for b in old.iter(f"{{{OLD['bldg']}}}Building")]
+    assert [list_attributes(b, 3) for b in new(later, "//bldg:Building")] == old_attributes
+    assert all(old_attributes)
     assert new(later, "//gen:IntAttribute[gen:name='n']/gen:value/text()") == ["3"]
-    for path in (
-        "//bldg:roofType/text()",
-        "//bldg:roofType/@codeSpace",
-        "//gml:name/text()",
-        "//gml:posList/text()",
-    ):
-        assert sorted(new(later, path)) == sorted(old.xpath(path, namespaces=OLD))
+    texts = ("bldg:roofType/text()", "bldg:roofType/@codeSpace", "gml:name/text()")
+    for path in (*texts, "gml:posList/text()"):
+        assert sorted(new(later, f"//{path}")) == sorted(old.xpath(f"//{path}", namespaces=OLD))
 
 
 def test_heights_dates_and_terrain_lines_are_told_in_the_newer_way(roots):
     old, later = roots
-    heights = old.xpath("//bldg:measuredHeight/text()", namespaces=OLD)
-    assert (
-        new(later, "//con:height/con:Height[con:status='measured']/con:value[@uom='m']/text()")
-        == heights
-    )
+
+    def find_old(path):
+        return old.xpath(path, namespaces=OLD)
+
+    height = "//con:height/con:Height[con:status='measured']/con:value[@uom='m']/text()"
+    assert new(later, height) == find_old("//bldg:measuredHeight/text()")
     assert set(new(later, "//core:creationDate/text()")) == {"2020-02-03T00:00:00"}
     for level in (1, 2):
-        lines = old.xpath(
-            f"//bldg:lod{level}TerrainIntersection//gml:posList/text()", namespaces=OLD
-        )
+        lines = find_old(f"//bldg:lod{level}TerrainIntersection//gml:posList/text()")
         assert new(later, f"//core:lod{level}TerrainIntersectionCurve//gml:posList/text()") == lines
     assert new(later, "//gml:MultiCurve")
-    assert new(later, "/core:CityModel/gml:boundedBy/gml:Envelope/@srsName") == old.xpath(
-        "//@srsName"
-    )
+    envelope = "/core:CityModel/gml:boundedBy/gml:Envelope/@srsName"
+    assert new(later, envelope) == find_old("//@srsName")
 
 
 def test_parts_and_level_0_are_told_in_the_newer_way():
     member = upgrade_member(Fragment(TWO_PARTS.replace("\n", "").encode(), (0.0,) * 6))
     declared = " ".join(f'xmlns:{prefix}="{uri}"' for prefix, uri in NAMESPACES_3.items())
-    root = etree.fromstring(
-        f'<core:CityModel {declared} gml:id="c">'.encode() + member.text + b"</core:CityModel>"
-    )
+    head = f'<core:CityModel {declared} gml:id="c">'.encode()
+    root = etree.fromstring(head + member.text + b"</core:CityModel>")
     assert b"xmlns" not in member.text and member.extent == (0.0,) * 6
     assert_told_as_the_schemas_ask(root)
     (part,) = new(root, "//bldg:Building/bldg:buildingPart/bldg:BuildingPart")
     assert new(part, "bldg:roofType/text()") == ["1030"] and new(part, "core:lod1Solid/gml:Solid")
     assert new(part, "core:genericAttribute/gen:IntAttribute/gen:value/text()") == ["3"]
-    one_set = (
-        "core:genericAttribute/gen:GenericAttributeSet[gen:name='s']"
-        "/gen:genericAttribute/gen:DoubleAttribute"
-    )
-    assert new(part, f"{one_set}[gen:name='width']/gen:value/text()") == ["8.5"]
-    assert new(
-        root, "//core:boundary/con:GroundSurface/core:lod0MultiSurface//gml:posList/text()"
-    ) == ["0 0 0 1 0 0 1 1 0 0 0 0"]
-    assert (
-        len(new(root, "//core:boundary/con:RoofSurface/core:lod0MultiSurface/gml:MultiSurface"))
-        == 1
-    )
+    one_set = "core:genericAttribute/gen:GenericAttributeSet[gen:name='s']/gen:genericAttribute"
+    width = f"{one_set}/gen:DoubleAttribute[gen:name='width']/gen:value/text()"
+    assert new(part, width) == ["8.5"]
+    ground = "//core:boundary/con:GroundSurface/core:lod0MultiSurface//gml:posList/text()"
+    assert new(root, ground) == ["0 0 0 1 0 0 1 1 0 0 0 0"]
+    roof = "//core:boundary/con:RoofSurface/core:lod0MultiSurface/gml:MultiSurface"
+    assert len(new(root, roof)) == 1
 
 
 def test_no_buildings_make_an_empty_model(tmp_path):

@@ -1,6 +1,4 @@
-"""CityJSON against its own schema, read back, and through the eyes of a tool that
-measures models.
-"""
+"""CityJSON against its own schema, read back, and as a tool sees it that measures models."""
 
 import json
 

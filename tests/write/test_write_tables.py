@@ -1,6 +1,4 @@
-"""parameters.jsonl and buildings.gpkg: what goes in comes out, whatever the input's
-attributes are.
-"""
+"""parameters.jsonl and buildings.gpkg: what goes in comes out, whatever the attributes are."""
 
 import json
 import warnings
@@ -17,8 +15,10 @@ from hiproof import build, read_parameters
 from hiproof.errors import InputError
 from hiproof.parametric.run import build_file
 from hiproof.write import write_attributes, write_parameters
+from hiproof.write.head import FileHead
 from hiproof.write.tables import vector_layer
 from hiproof.write.tables.geopackage import attributes_with_a_column
+from hiproof.write.tables.geoparquet import GEOMETRY_TYPES, GeoParquetWriter
 from hiproof.write.tables.rows import part_rows
 
 
@@ -33,12 +33,8 @@ def test_parameters_come_back(tmp_path):
     building = make_building(gable_house(), kinds=("gable", "flat"), objective=-12.3456789)
     write_parameters(tmp_path / "p.jsonl", [make_lost_building(), building])
     lost, record = read_parameters(tmp_path / "p.jsonl")
-    assert (lost["id"], lost["status"], lost["type"], lost["parts"]) == (
-        "lost",
-        "no_points",
-        None,
-        [],
-    )
+    assert [lost[name] for name in ("id", "status", "type")] == ["lost", "no_points", None]
+    assert lost["parts"] == [] and [p["type"] for p in record["parts"]] == ["gable", "flat"]
     part = record["parts"][0]
     assert part["parameters"] == {"width": 8.0, "height": 4.0}
     assert record["origin"] == RD_ORIGIN.tolist()
@@ -47,7 +43,6 @@ def test_parameters_come_back(tmp_path):
     assert record["objective"] == -12.345679
     assert record["residuals"]["psd_mean"] == 0.05
     assert record["residuals"]["psd_std"] is None
-    assert [part["type"] for part in record["parts"]] == ["gable", "flat"]
 
 
 def test_of_thousands_of_attributes_a_table_holds_the_first_and_all_of_our_own(tmp_path):
@@ -55,11 +50,9 @@ def test_of_thousands_of_attributes_a_table_holds_the_first_and_all_of_our_own(t
     were full.
     """
     building = make_building(box())
-    large = {f"a{i}": i for i in range(2500)}
+    attributes = building.attributes | {f"a{i}": i for i in range(2500)}
     columns_of_few, _, _ = table(tmp_path, [building])
-    columns, _, _ = table(
-        tmp_path, [replace(building, attributes={**building.attributes, **large})]
-    )
+    columns, _, _ = table(tmp_path, [replace(building, attributes=attributes)])
     assert set(columns_of_few) < set(columns) and len(columns) == 1998
     room = attributes_with_a_column()
     assert all(columns[f"a{i}"][0] == i for i in range(room)) and "a2499" not in columns
@@ -74,21 +67,16 @@ def test_outlines_come_back(tmp_path):
 
 
 def test_parameters_are_strict_json(tmp_path):
-    part = replace(
-        make_building(box()).parts[0],
-        parameters={"width": float("nan")},
-        translation=np.array([0, -0.0, np.inf]),
-    )
     building = make_building(box(), objective=float("nan"))
-    building = replace(
-        building, built=replace(building.model, roof=replace(building.roof, parts=(part,)))
-    )
+    odd = {"parameters": {"width": float("nan")}, "translation": np.array([0, -0.0, np.inf])}
+    roof = replace(building.roof, parts=(replace(building.parts[0], **odd),))
+    building = replace(building, built=replace(building.model, roof=roof))
     write_parameters(tmp_path / "p.jsonl", [building])
     text = (tmp_path / "p.jsonl").read_text()
-    _, line = text.splitlines()
-    (part,) = json.loads(line, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))[
-        "parts"
-    ]
+    record = json.loads(
+        text.splitlines()[1], parse_constant=lambda name: pytest.fail(f"{name} is no JSON")
+    )
+    (part,) = record["parts"]
     assert part["parameters"] == {"width": None}
     assert part["position"] == [0.0, 0.0, None]
     assert "-0.0" not in text
@@ -108,13 +96,9 @@ def test_a_parameters_file_that_is_not_there(tmp_path):
 
 def test_the_table_has_every_building(tmp_path):
     square = shapely.box(85000, 446000, 85001, 446001)
-    buildings = [
-        make_lost_building(),
-        make_lost_building("asked", footprint=square),
-        make_building(gable_house()),
-        make_building(courtyard()),
-    ]
-    columns, outlines, meta = table(tmp_path, buildings)
+    lost = [make_lost_building(), make_lost_building("asked", footprint=square)]
+    built = [make_building(gable_house()), make_building(courtyard())]
+    columns, outlines, meta = table(tmp_path, [*lost, *built])
     assert columns["id"].tolist() == ["lost", "asked", "a", "a"]
     assert columns["hiproof_status"].tolist() == ["no_points", "no_points", "modelled", "modelled"]
     assert columns["rf_volume_lod22"][2:].tolist() == [480.0, 420.0]
@@ -147,28 +131,19 @@ def test_a_footprint_without_area_is_no_geometry_as_in_what_is_built_of_its_para
     ],
 )
 def test_a_column_has_one_type(tmp_path, values, dtype, want):
-    columns, _, _ = table(
-        tmp_path, [make_lost_building(attributes={"v": value}) for value in values]
-    )
+    lost = [make_lost_building(attributes={"v": value}) for value in values]
+    columns, _, _ = table(tmp_path, lost)
     assert columns["v"].dtype == dtype
     np.testing.assert_array_equal(columns["v"], np.array(want, dtype=columns["v"].dtype))
 
 
-def test_unknown_figures_stay_numbers(tmp_path):
+def test_unknown_figures_stay_numbers_and_counts_stay_counts(tmp_path):
     _, _, meta = table(tmp_path, [make_lost_building()])
     kinds = dict(zip(meta["fields"], meta["dtypes"], strict=True))
-    assert (kinds["rf_h_ground"], kinds["hiproof_psd_mean"], kinds["hiproof_iso19107_lod22"]) == (
-        "float64",
-    ) * 2 + ("object",)
-
-
-def test_counts_are_counts_where_all_are_unknown(tmp_path):
-    table(tmp_path, [make_lost_building()])
-    for layer, names in (
-        ("buildings", ["rf_roof_n_surfaces"]),
-        ("parts", ["part"]),
-        ("roof_surfaces", ["number", "part"]),
-    ):
+    figures = ("rf_h_ground", "hiproof_psd_mean", "hiproof_iso19107_lod22")
+    assert [kinds[name] for name in figures] == ["float64", "float64", "object"]
+    counts = {"buildings": ["rf_roof_n_surfaces"], "parts": ["part"]}
+    for layer, names in (counts | {"roof_surfaces": ["number", "part"]}).items():
         info = pyogrio.read_info(tmp_path / "a.gpkg", layer=layer)
         kinds = dict(zip(info["fields"], info["ogr_types"], strict=True))
         assert {kinds[name] for name in names} == {"OFTInteger64"}
@@ -177,21 +152,15 @@ def test_counts_are_counts_where_all_are_unknown(tmp_path):
 def test_names_that_clash(tmp_path):
     clashing = {"fid": 7, "geom": "x", "ID": 3, "Name": 1, "name": 2, "hiproof_status": "theirs"}
     columns, _, _ = table(tmp_path, [make_building(box(), attributes=clashing)])
-    assert columns["id"].tolist() == ["a"]
-    assert columns["hiproof_status"].tolist() == ["modelled"]
-    assert (
-        columns["fid_2"][0],
-        columns["geom_2"][0],
-        columns["name_2"][0],
-        columns["ID_input"][0],
-    ) == (7, "x", 2, 3)
+    expected = {"id": "a", "hiproof_status": "modelled"}
+    expected |= {"fid_2": 7, "geom_2": "x", "name_2": 2, "ID_input": 3}
+    assert {name: columns[name][0] for name in expected} == expected
 
 
 def test_many_rows_are_written_in_batches(tmp_path, monkeypatch):
     monkeypatch.setattr(vector_layer, "BATCH_ROWS", 4)
-    columns, _, _ = table(
-        tmp_path, [make_lost_building(str(n), attributes={"n": n}) for n in range(11)]
-    )
+    lost = [make_lost_building(str(n), attributes={"n": n}) for n in range(11)]
+    columns, _, _ = table(tmp_path, lost)
     assert columns["n"].tolist() == list(range(11))
 
 
@@ -252,3 +221,53 @@ def test_a_part_that_nothing_shows_of_has_no_row():
     building = build(record | {"parts": [flat, hidden]})
     (row,) = part_rows(building)
     assert row[0] is not None and row[1]["part"] == 0
+
+
+def street():
+    attributes = {"year": 1905, "name": "Oude Kerk", "listed": True}
+    yield make_building(gable_house(), attributes=attributes)
+    yield make_building(courtyard(), id="block", attributes={"year": 1999.5})
+    yield make_lost_building()
+
+
+@pytest.mark.parametrize("layer", GEOMETRY_TYPES)
+def test_the_same_rows_as_the_geopackage(tmp_path, layer):
+    pq = pytest.importorskip("pyarrow.parquet", reason="needs pyarrow, part of the extra `city`")
+    write_attributes(tmp_path / "b.gpkg", street(), "EPSG:7415")
+    GeoParquetWriter(tmp_path / "b.parquet", FileHead("EPSG:7415"), layer).add_all(street())
+    table = pq.read_table(tmp_path / "b.parquet")
+    meta, _, wkb, columns = pyogrio.raw.read(tmp_path / "b.gpkg", layer=layer)
+    assert table.column_names == [*meta["fields"], "geometry"]
+    for name, expected in zip(meta["fields"], columns, strict=True):
+        for got, value in zip(table[name].to_pylist(), expected.tolist(), strict=True):
+            missing = value is None or (isinstance(value, float) and np.isnan(value))
+            assert got is None if missing else got == value
+    for got, expected in zip(table["geometry"].to_pylist(), wkb, strict=True):
+        assert (got is None) == (expected is None)
+        assert got is None or shapely.from_wkb(got).equals(shapely.from_wkb(expected))
+
+
+def test_an_attribute_called_geometry_stands_beside_the_outline(tmp_path):
+    pq = pytest.importorskip("pyarrow.parquet", reason="needs pyarrow, part of the extra `city`")
+    house = make_building(gable_house(), attributes={"geometry": "poly", "Geometry": 1})
+    GeoParquetWriter(tmp_path / "b.parquet", FileHead("EPSG:7415")).add_all([house])
+    (row,) = pq.read_table(tmp_path / "b.parquet").to_pylist()
+    assert (row["geometry_2"], row["Geometry_3"]) == ("poly", 1)
+    assert shapely.from_wkb(row["geometry"]).area == pytest.approx(96.0)
+
+
+def test_the_file_describes_its_geometry(tmp_path):
+    pq = pytest.importorskip("pyarrow.parquet", reason="needs pyarrow, part of the extra `city`")
+    with GeoParquetWriter(tmp_path / "b.parquet", FileHead("EPSG:7415")):
+        pass
+    geo = json.loads(pq.read_schema(tmp_path / "b.parquet").metadata[b"geo"])
+    assert geo["primary_column"] == "geometry"
+    assert geo["columns"]["geometry"]["encoding"] == "WKB"
+    assert geo["columns"]["geometry"]["crs"]["id"] == {"authority": "EPSG", "code": 28992}
+
+
+def test_without_pyarrow_one_sentence_says_what_to_install(tmp_path, monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "pyarrow", None)
+    with pytest.raises(InputError, match=r"hiproof\[parquet\]"):
+        GeoParquetWriter(tmp_path / "b.parquet", FileHead())
+    assert not list(tmp_path.iterdir())
