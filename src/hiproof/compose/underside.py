@@ -66,12 +66,13 @@ def make_underside(solid: Solid, underside: Underside, options: ComposeSettings)
     caps = [cap_by_place(solid, clearance)]
     if underside.terrain:
         caps.append(cap_everywhere(solid, clearance))
-    for cap, reach in itertools.product(caps, REACHES):
+    for cap in caps:
         lids = list_undersides(solid, underside, cap, draw_ground(solid), list_places(roofs))
-        result = close_lids([*roofs, *lids], reach)
-        findings = check_solid(result, planarity_m=options.planarity_m)
-        if not findings:
-            return result
+        for reach in REACHES:
+            result = close_lids([*roofs, *lids], reach)
+            findings = check_solid(result, planarity_m=options.planarity_m)
+            if not findings:
+                return result
     if underside.passages and findings[0].code == OPEN:
         raise CompositionError(
             "expected passages whose corners lie on the walls they cross, got one beside a wall; "

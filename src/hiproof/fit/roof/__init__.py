@@ -96,7 +96,7 @@ def fit_building(
     types = settings.fit.types
     whole = lay_out_whole(plan, outline, settings.compound, types)
     xy = plan.frame.xy_local(np.column_stack(place_nodes(whole.scene, VISIBLE_DEPTH_M)))
-    drawn, price = draw_parts(whole, outline, settings)
+    drawn, price = draw_parts(whole, settings)
     visible = keep_visible(drawn, xy)
     parts = fit_custom_shapes(combine_parts(visible, types), points_local, settings)
     parts = fit_curved_shapes(parts, plan.points, outline, settings)
@@ -109,17 +109,15 @@ def fit_building(
     return BuildingFit(tuple(parts), outline, price, whole.scene.n, unexplained)
 
 
-def draw_parts(
-    whole: Whole, outline: shapely.Polygon, settings: Settings
-) -> tuple[list[Part], float]:
+def draw_parts(whole: Whole, settings: Settings) -> tuple[list[Part], float]:
     """Draw the search's volumes, improve them until no move saves, and name them as parts.
 
     Also returns the price (points) of the drawn roof.
     """
-    scene, plan, types = whole.scene, whole.plan, settings.fit.types
+    plan, types = whole.plan, settings.fit.types
     unit = compute_unit(plan.density, settings.compound)
     keeps_shapes = bool(types) and not {*CATALOGUE} <= {*types, *CURVED}
-    site = make_site(scene, whole.outline, unit, plan.border, keeps_shapes)
+    site = make_site(whole.scene, whole.outline, unit, plan.border, keeps_shapes)
     roof, price = find_roof(whole, site, settings.compound)
     return read_parts(roof, site, whole.outline, plan, types), price
 

@@ -120,19 +120,13 @@ def drop_planes(volumes, scene, value, k, context):
         if volumes[k, OFFSET0 + plane] == np.inf or count_planes(volumes[k]) < 2:
             continue
         trial = volumes.copy()
-        remove_plane(trial[k], plane)
+        trial[k, OFFSET0 + plane] = np.inf
+        if plane < LEVEL:
+            trial[k, SLOPE0 + plane] = trial[k, LEAN0 + plane] = 0.0
         trial, trial_value = settle_move(trial, scene, k, value, EVERYWHERE, context)
         if trial_value < np.inf:
             volumes, value = trial, trial_value
     return volumes, value
-
-
-@compiled
-def remove_plane(row, plane):
-    """Take a plane off a volume, in place."""
-    row[OFFSET0 + plane] = np.inf
-    if plane < LEVEL:
-        row[SLOPE0 + plane] = row[LEAN0 + plane] = 0.0
 
 
 @compiled

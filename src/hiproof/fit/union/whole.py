@@ -32,7 +32,7 @@ def clip_to_box(geometry: shapely.Geometry, box: Box) -> shapely.Geometry:
 
 
 class Whole:
-    """The points and the outline of one large building while its blocks are searched.
+    """The points and the outline of a building. A large one is searched block by block.
 
     `scene` is that of all points. `u`, `v`, `z` (n,) are the points, ascending by u, and `outline`
     is in the plan's axes.
@@ -43,9 +43,7 @@ class Whole:
         order = scene.order[0, 0]
         order = order[order < scene.n]
         self.u, self.v, self.z = scene.U[0][order], scene.V[0][order], scene.z[order]
-        self.outline = shapely.transform(
-            outline, lambda xy: (xy - plan.frame.origin[:2]) @ plan.frame.rotation.T
-        )
+        self.outline = shapely.transform(outline, plan.frame.uv_plan)
         u0, v0, u1, v1 = self.outline.bounds
         self.box, self.area = Box(u0, u1, v0, v1), outline.area
 
