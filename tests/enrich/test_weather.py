@@ -73,6 +73,11 @@ def make_overcast(columns):
     columns["dhi"][:], columns["dni"][:] = columns["ghi"], 0.0
 
 
+def level_beam(columns):
+    """Put the part of the direct radiation that falls on level ground in its column."""
+    columns["dni"] = columns["ghi"] - columns["dhi"]
+
+
 @pytest.mark.parametrize(
     "change, reason",
     [
@@ -90,7 +95,9 @@ def make_overcast(columns):
         (spoil(ghi=lambda v: 3.6 * v, dhi=lambda v: 3.6 * v), "beyond what reache"),
         (spoil(**dict.fromkeys(("ghi", "dhi", "dni"), 0)), "got only 0.0% of what reaches the atm"),
         (spoil(**dict.fromkeys(("ghi", "dhi", "dni"), lambda v: v / 1000)), "got only 0.0% of wha"),
-        (spoil(slice(4800, 5544), ghi=0, dhi=0, dni=0), "got 31 days without radi.*on 20 July"),
+        (spoil(slice(4800, 5544), ghi=0, dhi=0, dni=0), "hours without radi.*on 20 July"),
+        (spoil(slice(4811, 4813), ghi=0, dhi=0, dni=0), "2 hours without.*on 20 July, 11:30"),
+        (level_beam, "got direct radiation on level ground in place of that towards the sun"),
         (spoil(ghi=lambda v: np.roll(v, 1)), "beyond what reaches the atmosphere at its hours"),
         (
             lambda columns: columns["stamps"].__setitem__(9, columns["stamps"][8]),
@@ -162,10 +169,10 @@ def test_hours_that_stay_the_same_come_with_a_warning(tmp_path):
 @pytest.mark.parametrize(
     "place, said, when",
     [
-        ({"longitude": 4.36, "zone": 0}, {"longitude": -4.36}, "after"),
-        ({"longitude": -3.0, "zone": 0}, {"longitude": 3.0}, "before"),
-        ({"longitude": 77.2, "zone": 5.5}, {"zone": 5}, "before"),
-        ({"longitude": 77.2, "zone": 5.5}, {"zone": 6}, "after"),
+        ({"longitude": 4.36, "zone": 0}, {"longitude": -4.36}, "40 minutes after"),
+        ({"longitude": -3.0, "zone": 0}, {"longitude": 3.0}, "20 minutes before"),
+        ({"longitude": 77.2, "zone": 5.5}, {"zone": 5}, "[24]0 minutes before"),
+        ({"longitude": 77.2, "zone": 5.5}, {"zone": 6}, "[24]0 minutes after"),
     ],
     ids=["a sign lost", "a sign added", "India at 5 h", "India at 6 h"],
 )
@@ -181,8 +188,36 @@ def test_a_sun_half_an_hour_off_comes_with_a_warning(place, said, when, tmp_path
         warnings.simplefilter("always")
         read_year(str(tmp_path / "right/a.epw"))
     assert not [w for w in caught if issubclass(w.category, InputWarning)]
-    with pytest.warns(InputWarning, match=f"fit the sun about half an hour {when} its times"):
+    with pytest.warns(InputWarning, match=f"fit the sun about {when} its times; "):
         read_year(str(tmp_path / "wrong/a.epw"))
+
+
+def shroud(columns):
+    """Dim every day by clouds of its own, so that no hour is too bright for its sun."""
+    share = np.repeat(np.random.default_rng(0).uniform(0.2, 0.6, 365), 24)
+    beam = 0.5 * share * (columns["ghi"] - columns["dhi"])
+    columns["dni"] *= 0.5 * share
+    columns["dhi"] = share * columns["ghi"] - beam
+    columns["ghi"] = share * columns["ghi"]
+
+
+@pytest.mark.parametrize(
+    "hours, moved",
+    [
+        (slice(None), r"60 minutes before its times; check"),
+        (slice(24 * 85, 24 * 300), r"60 minutes before its times from April to September; check"),
+    ],
+    ids=["all year", "clocks put forward"],
+)
+def test_a_sun_an_hour_off_under_clouds_comes_with_a_warning(hours, moved, tmp_path):
+    def change(columns):
+        shroud(columns)
+        for name in ("ghi", "dhi", "dni"):
+            columns[name][hours] = np.roll(columns[name], 1)[hours]
+
+    write_epw(tmp_path / "a.epw", change=change)
+    with pytest.warns(InputWarning, match=f"fit the sun about {moved}"):
+        read_year(str(tmp_path / "a.epw"))
 
 
 @settings(max_examples=20, deadline=None)

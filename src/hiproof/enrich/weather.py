@@ -28,12 +28,13 @@ FARTHEST_STATION_KM = 300.0  # distance (km) beyond which weather says nothing o
 EARTH_RADIUS_KM = 6371.0  # mean radius
 PVGIS_CSV = "Latitude"  # beginning of PVGIS' tables; other tables are TMY3's
 MISSING_WM2 = 9999.0  # irradiance (W/m2) from which EPW calls a value missing; others use negatives
-SUN_MINUTES = (-40, -20, 0, 20, 40)  # any three in a row give the mean sun of an hour
+SUN_MINUTES = range(-120, 121, 20)  # any three in a row give the mean sun of an hour
 MOVED, LEAST_MOVED = 0.6, 0.02
-"""Share of the gap between global radiation and its parts that is left 20 minutes on, below which
-the sun is 13 to 50 minutes off, and the least such gap, as a share of the year: 0.003 in pvlib's
-TMY3 files.
+"""Share of the gap between global radiation and its parts that is left with the sun of another time
+(from 13 minutes on) or with direct radiation on level ground, below which that is what the file
+holds, and the least such gap, as a share of half a year: 0.004 in pvlib's TMY3 files.
 """
+SUMMER_DAYS = (90, 273)  # days of the year with clocks put forward (north) or not (south)
 GREATEST_EXCESS = 0.007
 """Share of a year's global radiation that may exceed what reaches the top of the atmosphere.
 
@@ -214,13 +215,13 @@ def refuse_other_sun(weather: Weather, path: str) -> None:
     """Raise InputError for radiation that does not fit the sun over the station."""
     ghi, dhi, dni = weather.values.to_numpy().T
     rises = measure_rises(weather)
-    rise = rises[1]
+    rise = rises[len(rises) // 2]
     ceiling = import_pvlib().irradiance.get_extra_radiation(weather.times).to_numpy()
     got, total = "", max(float(ghi.sum()), 1.0)
     gaps, excess = np.abs(ghi - dhi - dni * rise), np.maximum(ghi - ceiling * rise, 0.0)
     share = total / float((ceiling * rise).sum())
-    days, noons = ghi.reshape(-1, 24).sum(axis=1), rise.reshape(-1, 24).max(axis=1)
-    is_dark = (days == 0.0) & (noons > DAYLIGHT_RISE)
+    is_high = rise > DAYLIGHT_RISE
+    is_dark = (ghi == 0.0) & is_high
     worst = int(np.maximum(np.maximum(gaps, excess), np.maximum(dni - ceiling, 0.0)).argmax())
     if excess.sum() > GREATEST_EXCESS * total or excess[worst] > GREATEST_GAP_WM2:
         got = (
@@ -232,21 +233,22 @@ def refuse_other_sun(weather: Weather, path: str) -> None:
             f"global radiation of {ghi[worst]:g} W/m2 beside {dhi[worst]:g} diffuse and "
             f"{dni[worst]:g} direct on {weather.times[worst]:%d %B, %H:%M}"
         )
+    elif np.abs(ghi - dhi - dni).sum() < MOVED * gaps.sum() and gaps.sum() > LEAST_MOVED * total:
+        got = "direct radiation on level ground in place of that towards the sun"
     elif gaps.sum() > GREATEST_GAP * total:
         got = f"diffuse and direct radiation {gaps.sum() / total:.0%} off the global"
     elif share < LEAST_CLEARNESS:
         got = f"only {share:.1%} of what reaches the atmosphere in a year"
     elif is_dark.any():
-        day = weather.times[24 * int(is_dark.argmax())]
         got = (
-            f"{count_things(int(is_dark.sum()), 'day')} without radiation, the first on {day:%d %B}"
+            f"{count_things(int(is_dark.sum()), 'hour')} without radiation under a high sun, the "
+            f"first on {weather.times[is_dark.argmax()]:%d %B, %H:%M}"
         )
     if got:
         raise InputError(
             f"expected radiation in {path} that fits the sun over its station, got {got}; use "
             "another file"
         )
-    is_high = rise > DAYLIGHT_RISE
     brightness = float(np.quantile((ghi / ceiling)[is_high] / rise[is_high], BRIGHTEST))
     warn_of_dull_sun(path, float(dhi.sum()) / total, brightness)
     warn_of_moved_sun(weather, rises, path)
@@ -301,20 +303,34 @@ def warn_of_repeated_hours(weather: Weather, path: str) -> None:
 
 
 def warn_of_moved_sun(weather: Weather, rises: np.ndarray, path: str) -> None:
-    """Warn of direct radiation that fits the sun of another time better (`rises` as measured)."""
+    """Warn of direct radiation that fits the sun of another time better (`rises` as measured).
+
+    Clocks put forward are off in a half of the year.
+    """
     ghi, dhi, dni = weather.values.to_numpy().T
-    early, gap, late = np.abs(ghi - dhi - dni * rises).sum(axis=1)
-    if min(early, late) < MOVED * gap and gap > LEAST_MOVED * ghi.sum():
+    first, last = SUMMER_DAYS
+    day = weather.times.day_of_year.to_numpy()
+    is_summer = (day > first) & (day <= last)
+    moved: dict[str, list[str]] = {}
+    for months, is_part in (("April to September", is_summer), ("October to March", ~is_summer)):
+        gaps = np.abs(ghi - dhi - dni * rises)[:, is_part].sum(axis=1)
+        best, gap = int(gaps.argmin()), gaps[len(gaps) // 2]
+        if gaps[best] < MOVED * gap and gap > LEAST_MOVED * ghi[is_part].sum():
+            minutes = SUN_MINUTES[best + 1]
+            text = f"about {abs(minutes)} minutes {'before' if minutes < 0 else 'after'} its times"
+            moved.setdefault(text, []).append(f" from {months}")
+    if moved:
+        parts = [text + (months[0] if len(months) == 1 else "") for text, months in moved.items()]
         warn(
             path,
-            "has diffuse and direct radiation that fit the sun about half an hour "
-            f"{'before' if early < late else 'after'} its times; check the longitude and time zone "
-            "of its station, and that its stamps end their hours",
+            "has diffuse and direct radiation that fit the sun "
+            f"{' and '.join(parts)}; check the longitude and time zone of its station, its clock "
+            "in summer, and that its stamps end their hours",
         )
 
 
 def measure_rises(weather: Weather) -> np.ndarray:
-    """Return sines (3, n) of the sun's elevation 20 minutes before each time, then, and 20 after.
+    """Return sines (k, n) of the sun's elevation at the times and up to 100 minutes beside them.
 
     Each is the mean around its time, and 0 below the horizon.
     """
