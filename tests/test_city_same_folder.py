@@ -245,11 +245,15 @@ def test_a_file_that_was_lost_or_damaged_is_made_again(
         file.unlink()
     else:
         content[len(content) // 2] ^= 1
-        file.write_bytes(content if harm == "one byte" else content[:-1])
+        changed = bytes(content if harm == "one byte" else content[:-1])
+        file.write_bytes(changed)
     with pytest.warns(UserWarning, match=f"{name} is gone or not as the run left it"):
         reconstruct_area(request)
     assert records(tmp_path) == records(reference_run)
     assert file.read_bytes() == (reference_run / name).read_bytes()
+    kept = [path.read_bytes() for path in tmp_path.glob("parameters.edited-*")]
+    is_kept = name == "parameters.jsonl" and harm != "removed"
+    assert kept == ([changed] if is_kept else [])  # a person may have edited it
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         reconstruct_area(request)

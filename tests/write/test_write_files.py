@@ -256,6 +256,15 @@ RUN_COMMANDS = {
     "segment CLOUD --out CLOUD": "got .* for both",
     "evaluate RUN RUN/evaluation.csv": "got .* for both",
     "settings --config TOML --write TOML": "got .* for both",
+    "settings --write CLOUD": "a new file or one of settings",
+    "settings --write RUN/parameters.jsonl": "a new file or one of settings",
+    "settings --write FIFO": "a device or a pipe",
+    "segment CLOUD --out RUN/changes.laz": "a file of a run",
+    "build RUN/parameters.jsonl --out RUN/.hiproof": "where a run keeps its state",
+    "enrich RUN --out RUN/.hiproof/a": "where a run keeps its state",
+    "report RUN --out RUN/.hiproof/a.html": "where a run keeps its state",
+    "reconstruct CLOUD --out RUN/.hiproof": "where a run keeps its state",
+    "update RUN CLOUD --date 2024-05-01 --out RUN/new": "outside that of the run",
     "reconstruct CLOUD --footprints IN/buildings.gpkg --out IN": "got .* for both",
     "reconstruct CLOUD --overrides IN/parameters.jsonl --out IN": "got .* for both",
     "reconstruct CLOUD --out IN --log-file CLOUD": "got .* for both",
@@ -275,6 +284,7 @@ def test_outputs_never_stand_for_inputs_or_files_of_a_run(command, town):
     shutil.copy(town / "run" / "parameters.jsonl", town / "in")
     (town / "settings.toml").write_text("")
     (town / "run" / "evaluation.csv").write_text("0 0 0\n")
+    (town / "run" / "changes.csv").write_text("id\n")
     (town / "link.glb").symlink_to(town / "run" / "parameters.jsonl")
     os.link(town / "given" / "parameters.jsonl", town / "given.stl")
     os.mkfifo(town / "pipe")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from ..errors import OutputError
+from ..errors import HiproofError, OutputError
 from ..settings import Settings
 
 
@@ -19,12 +19,19 @@ def settings(*, config: Path | None = None, write: Path | None = None) -> None:
     if write is None:
         click.echo(text, nl=False)
         return
-    from ..write.files import refuse_overwriting
+    from ..write.files import refuse_overwriting, save_text
 
     refuse_overwriting([write], [config])
+    refuse_other_files(write)
+    save_text(write, text)
+
+
+def refuse_other_files(path: Path) -> None:
+    """Raise OutputError where a file at `path` is none of settings."""
     try:
-        write.write_text(text, encoding="utf-8")
-    except OSError as error:
+        if path.is_file():
+            Settings.from_toml(path)
+    except HiproofError as error:
         raise OutputError(
-            f"expected to write settings to {write}, got: {error}; choose another place"
+            f"expected a new file or one of settings to write, got {path}; choose another name"
         ) from error

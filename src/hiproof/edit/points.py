@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from ..city.folder.resume import STATE_FOLDER
 from ..city.plan.work_plan import PLAN_FILE, Job, WorkPlan
 from ..city.work.noted import noted_file
 from ..city.work.solve import terrain_model
@@ -24,6 +23,7 @@ from ..geometry.thin import thin_to_count
 from ..parametric.record import read_outline
 from ..read.terrain.raster import import_rasterio
 from ..stages.points import distinct, usable
+from ..write.files import STATE_FOLDER
 
 # work tiles and buildings whose points stay in memory: those a person goes back and forth between
 KEPT_TILES, KEPT_BUILDINGS = 3, 64

@@ -26,7 +26,7 @@ from ..read.models.damage import finite
 from ..settings import Changes, Settings
 from ..status import Status
 from ..write.cityjson.features import choose_offset
-from ..write.files import refuse_overwriting, save_text
+from ..write.files import STATE_FOLDER, refuse_overwriting, save_text
 from ..write.fragments import Fragment, Fragments
 from ..write.head import FileHead
 from ..write.naming import FileUnits, UniqueNames, gml_name
@@ -92,7 +92,7 @@ def build_file(
     is written.
     """
     path, out, built = Path(path), Path(out), Built()
-    if (out / ".hiproof").exists():  # that command would make all its files again
+    if (out / STATE_FOLDER).exists():  # that command would make all its files again
         raise OutputError(
             f"expected a folder for what is built, got {out}, which holds a run of `hiproof "
             "reconstruct`; choose another --out"

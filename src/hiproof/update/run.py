@@ -66,9 +66,9 @@ def update_area(
     `changes` are settings that differ from the run's, by section. Raises InputError, SettingsError
     or OutputError (full sentences) when the update cannot start or go on; the same call goes on.
     """
-    if Path(request.out).resolve() == Path(request.run).resolve():
+    if Path(request.out).resolve().is_relative_to(Path(request.run).resolve()):
         raise OutputError(
-            f"expected another folder than the run itself with --out, got {request.out}; an update "
+            f"expected a folder outside that of the run with --out, got {request.out}; an update "
             "never changes its run"
         )
     if not 0 < request.significance < 1:

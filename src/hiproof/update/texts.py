@@ -13,13 +13,13 @@ from pathlib import Path
 from typing import Any
 
 from .. import __version__
-from ..city.folder.resume import STATE_FOLDER
 from ..city.merge.join import list_text_files
 from ..city.plan.work_plan import PLAN_FILE, WorkPlan
 from ..errors import HiproofError
 from ..evaluate.run import run_record
 from ..model import Building
 from ..parametric.building import build
+from ..write.files import STATE_FOLDER
 from ..write.fragments import Fragments, load_fragments
 from ..write.head import FileHead
 from ..write.naming import gml_name

@@ -237,6 +237,7 @@ def sync(path: Path) -> None:
         os.close(descriptor)
 
 
+STATE_FOLDER = ".hiproof"  # in the output folder of a run: what it resumes from
 RUN_RECORD = "run.json"  # what every run keeps beside its models
 PARAMETERS = FORMATS["parameters"].file
 # Files of a run's folder that no other command makes again.
@@ -247,9 +248,17 @@ OWN_FILES = frozenset(
 
 
 def refuse_overwriting(outputs: Iterable[Path], inputs: Iterable[Any]) -> None:
-    """Raise OutputError where an output is one of `inputs` (folders, addresses, None are not)."""
+    """Raise OutputError where an output is one of `inputs`, or lies in a run's own state.
+
+    Folders, addresses and None are no inputs.
+    """
     files = [Path(str(path)) for path in inputs if path and is_file(str(path))]
     for out in map(Path, outputs):
+        if STATE_FOLDER in Path(os.path.realpath(out)).parts:
+            raise OutputError(
+                f"expected a place outside {STATE_FOLDER}, where a run keeps its state, got {out}; "
+                "choose another"
+            )
         if out.exists() and any(out.samefile(file) for file in files):
             raise OutputError(
                 f"expected another file to write than the one that is read, got {out} for both; "
@@ -261,7 +270,7 @@ def refuse_run_file(out: Path) -> None:
     """Raise OutputError where a file to write is a run's own."""
     path = Path(os.path.realpath(out))
     is_own = path.name in OWN_FILES and (path.with_name(RUN_RECORD)).exists()
-    if path.is_file() and (is_own or path.name == PARAMETERS or ".hiproof" in path.parts):
+    if path.is_file() and (is_own or path.name == PARAMETERS):
         raise OutputError(
             f"expected a new file to write, got {out}, which is a file of a run; choose another "
             "name"

@@ -8,6 +8,7 @@ overrides, the choice of buildings or the work tiles changed.
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
 import secrets
 import shutil
@@ -22,7 +23,7 @@ from ...errors import OutputError, OutputWarning
 from ...formats import FORMATS, list_requested_files
 from ...log import LOGGER, count_things
 from ...masking import masked_values
-from ...write.files import atomic, save_text
+from ...write.files import PARAMETERS, STATE_FOLDER, atomic, save_text
 from ..merge.join import TEXTS_FOLDER, broken_claims, remove_tiles, write_tile
 from ..plan.from_cloud import Progress
 from ..plan.overrides import REDO, keep_overrides
@@ -33,8 +34,6 @@ from ..work.bundle_folders import remove_bundles
 from ..work.noted import NOTED_FOLDER
 from .ledger import Ledger
 from .marks import compute_mark, describe_inputs, describe_selection, find_changed_files
-
-STATE_FOLDER = ".hiproof"  # in the output folder: the run's own folder
 
 LEDGER_BYTES = 200_000  # of an empty one with its journal; where less is free that is what ails it
 
@@ -241,9 +240,22 @@ def stands(out: Path, ledger: Ledger) -> bool:
     if broken:
         names = ", ".join(broken[:5]) + (" and others" if len(broken) > 5 else "")
         warnings.warn(
-            f"{out}: {names} is gone or not as the run left it; all is made again", OutputWarning
+            f"{out}: {names} is gone or not as the run left it; all is made again"
+            + keep_edited(out, broken),
+            OutputWarning,
         )
     return not broken
+
+
+def keep_edited(out: Path, broken: list[str]) -> str:
+    """Rename parameters that were changed since, perhaps by hand; returns a clause that says so."""
+    path = Path(out) / PARAMETERS
+    if PARAMETERS not in broken or not path.exists():
+        return ""
+    names = (path.with_name(f"{path.stem}.edited-{n}{path.suffix}") for n in itertools.count(1))
+    kept = next(name for name in names if not name.exists())
+    path.rename(kept)
+    return f", and the changed {PARAMETERS} is kept as {kept.name}"
 
 
 def remove_unrequested(plan: WorkPlan, out: Path, ledger: Ledger) -> None:
