@@ -251,9 +251,8 @@ def fit_heights(
     starts = Candidates(np.full(len(thetas), kind), thetas, np.zeros(len(thetas)))
     for noise in (COARSE, MIDDLE, FINE) if primitive.minima else ():
         starts = search.minimise(search.whole, starts, noise, 6, 0.3)
-    candidates, noises = learn(search, starts)
-    best = int(np.argmin(candidates.values))
-    return candidates.thetas[best], Noise(*noises[best])
+    candidates, noises = learn(search, starts.select_within(0.0))
+    return candidates.thetas[0], Noise(*noises[0])
 
 
 def new_round_search(

@@ -48,6 +48,7 @@ ROUND_SHAPES = {
 RADII = (0.6, 0.9, 1.35, 2.0, 3.0)  # Of discs around a top, in radii of its part's area.
 LEAST_FALL_M = 0.3  # Least fall (m) from the top: less is a level roof.
 FEWEST_POINTS = 6  # A slope and a height, and as many points again to check them.
+LEAST_INSIDE = 0.6  # Least share of a disc that lies inside the outline.
 MOST_ASKED = 200  # Most points of a disc that say whether it is round: of more, every k-th does.
 CENTRE_ROUNDS = 3  # Rounds in which the middle of a disc is found.
 LEAST_RISE_M = 0.01  # A point of a disc rises at least so far (m) above its mean.
@@ -94,11 +95,14 @@ def list_top_shapes(
 ) -> Iterator[tuple[Part, int]]:
     """Yield round shapes around the top of a part, which is seen at the points `own` (k,)."""
     start, wide = roof.points[own, :2].mean(axis=0), math.sqrt(part.area / math.pi)
-    disc = own[:0]
+    disc, density = own[:0], len(roof.points) / roof.outline.area
     for radius in (share * wide for share in RADII):
         last = disc
         centre, disc = find_disc(roof.points, start, radius)
-        if np.array_equal(disc, last) or not roof.is_worth(disc, 0.0, CIRCLE_NUMBERS):
+        is_inside = len(disc) >= LEAST_INSIDE * density * math.pi * radius**2
+        if np.array_equal(disc, last) or not is_inside:
+            continue
+        if not roof.is_worth(disc, 0.0, CIRCLE_NUMBERS):
             continue
         some = disc[:: 1 + len(disc) // MOST_ASKED]
         misfit = roof.price_gaps(measure_round_gaps(roof.points[some], centre)).mean() * len(disc)
@@ -196,7 +200,8 @@ def fit_followers(
     numbers, variance = len(free) + shape.theta_size - Q0, 0.0
     inside = points[shapely.contains_xy(shape.part(theta).pieces[0].outline, *points[:, :2].T)]
     turns = np.arange(TURNS_TRIED if KAPPA in free else 1) * 2.0 * math.pi / len(shape.rim)
-    theta = find_start(inside, shape, theta, turns / TURNS_TRIED)
+    asked = inside[:: 1 + len(inside) // MOST_ASKED]
+    theta = find_start(asked, shape, theta, turns / TURNS_TRIED)
     for _ in range(GROWTH_ROUNDS):
         near = inside[np.abs(measure_gaps(inside, shape, theta)) <= 3.0]
         if len(near) < max(FEWEST_POINTS, 2 * numbers):
