@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import shapely
 
-from hiproof.fit.bare_ground import find_bare_ground, largest_sum, mark_near
+from hiproof.fit.bare_ground import find_bare_ground
 from hiproof.fit.standing import classify_standing, cover, ground_plane
 
 FOOTPRINT = shapely.box(0, 0, 16, 12)
@@ -120,20 +120,6 @@ def test_a_yard_that_would_leave_two_buildings_is_measured_and_not_cut():
     assert result.outline is None and result.area_m2 == pytest.approx(72, rel=0.1)
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_the_largest_sum_is_that_of_all_rectangles_tried(seed):
-    value = np.random.default_rng(seed).integers(-3, 3, (5, 7)).astype(float)
-    top, bottom, left, right, total = largest_sum(value)
-    sums = [
-        value[a:b, c:d].sum()
-        for a in range(5)
-        for b in range(a + 1, 6)
-        for c in range(7)
-        for d in range(c + 1, 8)
-    ]
-    assert total == max([0.0, *sums]) == value[top:bottom, left:right].sum()
-
-
 def sloping(xy):
     return 3.0 + 0.1 * xy[:, 0] - 0.2 * xy[:, 1]
 
@@ -166,17 +152,3 @@ def test_points_of_another_height_system_lie_on_no_ground():
     assert not classify_standing(
         np.column_stack([xy, np.full(len(xy), -43.0)]), np.zeros(3)
     ).is_low.any()
-
-
-@pytest.mark.parametrize("distance_m", [0.35, 0.9, 2.3])
-@pytest.mark.parametrize("shape", [(1, 7), (12, 1), (20, 30)])
-def test_a_place_is_near_where_any_point_is(distance_m, shape):
-    """As by all distances; points lie inside the grid, beside it and far from it."""
-    rng = np.random.default_rng(3)
-    y, x = (np.arange(n) * 0.5 + 10.2 for n in shape)
-    points = rng.uniform(5.0, 30.0, (60, 2))
-    places = np.stack(np.meshgrid(x, y), axis=-1)
-    distances = np.linalg.norm(places[:, :, None] - points, axis=-1)
-    np.testing.assert_array_equal(
-        mark_near(points, distance_m, x, y), distances.min(axis=-1) < distance_m
-    )

@@ -21,6 +21,7 @@ import shapely
 from ..geometry.grid import count_cells
 from ..geometry.point_in_polygon import find_inside
 from .direction import main_direction
+from .union.planes import bound_rows, find_best_rectangle
 
 NODE_M, MOST_NODES = 0.5, 200
 """Distance (m) between the places that are classified, and places along a side at most: the time
@@ -222,16 +223,18 @@ class ClassifiedPoints:
         inside = find_inside(outline, places[:, 0], places[:, 1])
         value = np.zeros(len(places))
         spacing = float(np.clip(estimate_spacing(roof), NEAREST_ROOF_M, FARTHEST_ROOF_M))
-        is_roof = mark_near(roof, spacing, x, y).ravel()[inside]
-        is_seen = mark_near(ground, BARE_REACH_M, x, y).ravel()[inside]
+        is_roof = are_near(places[inside], roof, spacing)
+        is_seen = are_near(places[inside], ground, BARE_REACH_M)
         value[inside] = np.where(is_roof, -ROOF_COST, np.where(is_seen, 1.0, -UNSEEN_COST))
         return cls(outline, roof, ground, spacing, node, x, y, value.reshape(grid_x.shape))
 
     def pieces(self, least_m2: float) -> Iterator[shapely.Polygon]:
         """Yield rectangles of at least `least_m2` of bare ground, the largest first."""
         least_width_m = min(LEAST_WIDTH_M, least_m2 / 2)
+        reach, column = np.empty(len(self.value) + 1), np.empty(self.value.shape[1])
         for _ in range(MOST_PIECES):
-            top, bottom, left, right, total = largest_sum(self.value)
+            bound_rows(self.value, reach)
+            total, top, bottom, left, right = find_best_rectangle(self.value, 0.0, reach, column)
             block = self.value[top:bottom, left:right]
             inside = block != 0
             if total * self.node**2 < least_m2 * LEAST_SEEN or not inside.any():
@@ -285,37 +288,12 @@ def first_dense(sorted_along: np.ndarray, spacing: float, largest: float) -> flo
     return float(sorted_along[dense[0]]) if len(dense) else None
 
 
-def mark_near(points: np.ndarray, distance_m: float, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return whether each place of a grid lies near any of `points` (n, 2).
+def are_near(places: np.ndarray, points: np.ndarray, distance_m: float) -> np.ndarray:
+    """Return whether each of `places` (m, 2) lies nearer than `distance_m` to one of the points."""
+    from scipy.spatial import cKDTree  # only where there is ground inside a footprint
 
-    Places are (rows, columns), and near is less than `distance_m`.
-
-    `x` (columns,) and `y` (rows,) are the places' coordinates.
-    """
-    marks = np.zeros((len(y), len(x)), bool)
-    columns, x_squares = list_near(points[:, 0], distance_m, x)
-    rows, y_squares = list_near(points[:, 1], distance_m, y)
-    near = y_squares[:, :, None] + x_squares[:, None, :] < distance_m**2
-    point, row, column = np.nonzero(near)
-    marks[rows[point, row], columns[point, column]] = True
-    return marks
-
-
-def list_near(
-    values: np.ndarray, distance_m: float, places: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the places on an axis that may lie near each of `values` (n,).
-
-    Near is within `distance_m` of the even `places`. Returns their numbers (n, k), and the squares
-    of their distances, infinite beyond an end.
-    """
-    step = places[1] - places[0] if len(places) > 1 else distance_m
-    reach = math.ceil(distance_m / step)
-    nearest = np.rint((values - places[0]) / step).astype(np.int64)
-    numbers = nearest[:, None] + np.arange(-reach, reach + 1)
-    selection = np.clip(numbers, 0, len(places) - 1)
-    squares = np.where(selection == numbers, (places[selection] - values[:, None]) ** 2, np.inf)
-    return selection, squares
+    nearest_m, _ = cKDTree(points).query(places, distance_upper_bound=distance_m)
+    return nearest_m < distance_m
 
 
 def estimate_spacing(roof: np.ndarray) -> float:
@@ -325,24 +303,3 @@ def estimate_spacing(roof: np.ndarray) -> float:
     """
     cells = count_cells(np.floor(roof))
     return math.sqrt(max(cells, 1) / len(roof))
-
-
-def largest_sum(value: np.ndarray) -> tuple[int, int, int, int, float]:
-    """Return the rectangle with the largest sum, and that sum.
-
-    It is rows [top, bottom) and columns [left, right).
-    """
-    sums = np.vstack([np.zeros(value.shape[1]), np.cumsum(value, axis=0)])
-    best = (0, 0, 0, 0, 0.0)
-    for top in range(len(value)):
-        strips = np.cumsum(sums[top + 1 :] - sums[top], axis=1)
-        lowest = np.minimum.accumulate(
-            np.hstack([np.zeros((len(strips), 1)), strips[:, :-1]]), axis=1
-        )
-        gain = strips - lowest
-        row, column = np.unravel_index(np.argmax(gain), gain.shape)
-        if gain[row, column] > best[4] + 1e-9:
-            previous = np.hstack([0.0, strips[row, :column]])
-            remainder = int(np.argmin(previous[: column + 1]))
-            best = (top, top + 1 + int(row), remainder, int(column) + 1, float(gain[row, column]))
-    return best
