@@ -14,10 +14,8 @@ beyond its footprint everywhere is no shift: some side of it must end behind one
 
 from __future__ import annotations
 
-import functools
 import math
 from dataclasses import dataclass, field
-from itertools import product
 
 import numpy as np
 import shapely
@@ -25,20 +23,16 @@ import shapely
 from ..compiled import compiled
 from ..geometry.grid import count_cells
 from ..geometry.point_in_polygon import find_inside
-from ..geometry.rings import counterclockwise, ring_edges
-from .outline.cost import cost_at_depth
+from ..geometry.rings import counterclockwise
 from .outline.lines import make_lines
 from .outline.settle import compute_span, side_offsets
-from .registration import BLUR_M, STRAY
-from .union.plan import measure_depth
+from .registration import COARSE_STEP, RASTER_PITCH_M, make_cell, make_shift_grid
 
 FARTHEST_M = 3.0  # a footprint is moved at most
 AROUND_M = 4.0  # of points that are asked for around it
-# m between the shifts tried first, and after that; m of half a cell of the raster of costs
-COARSE_M, FINE_M, PITCH_M = 0.5, 0.1, 0.1
+PITCH_M = 0.1  # m by which corners of a footprint do not matter
 # that are slid over the footprint: a bound on time, for all that comes after looks at every point
 SLID_POINTS = 600
-STRAY_FROM_M = 4.0 * BLUR_M  # outside, from where on all points cost the same
 # that are tried all around the footprint; eaves reach no farther over walls
 OVERHANGS_M = (0.0, 0.5, 1.0)
 # points; with fewer every shift holds as many; m: shorter sides tell no offset
@@ -194,68 +188,14 @@ def count_points_within(xy: np.ndarray, footprint: shapely.Polygon, overhang: fl
     It is grown by `overhang` (m). The search is coarse, then fine, and the shortest shift wins
     where several hold as many.
     """
-    lower = np.array(footprint.bounds[:2]) - STRAY_FROM_M - overhang
-    count = np.ceil(
-        (np.array(footprint.bounds[2:]) + STRAY_FROM_M + overhang - lower) / (2 * PITCH_M)
-    ).astype(int)
-    x, y = (
-        start + 2 * PITCH_M * np.arange(nodes) for start, nodes in zip(lower, count, strict=True)
-    )
-    depth = (
-        measure_depth(np.repeat(x, count[1]), np.tile(y, count[0]), *ring_edges(footprint))
-        + overhang
-    )
-    costs = costs_at(depth / BLUR_M).reshape(count)
-    few = np.ascontiguousarray(xy[:: max(1, len(xy) // SLID_POINTS)])
-    best = np.zeros(2)
-    for step, reach in ((COARSE_M, FARTHEST_M), (FINE_M, COARSE_M)):
-        candidates = best + list_moves(step, reach)
-        candidates = candidates[np.hypot(*candidates.T) <= FARTHEST_M]
-        cost = slid_costs(few, costs, lower, 2 * PITCH_M, candidates) + 0.1 * (candidates**2).sum(
-            axis=1
-        )
-        best = candidates[int(np.argmin(cost))]
-    return best
-
-
-@functools.cache
-def list_moves(step: float, reach: float) -> np.ndarray:
-    """Return moves (m, 2), `step` apart, up to `reach` along either axis."""
-    moves = np.arange(-reach, reach + 0.5 * step, step)
-    return np.array(list(product(moves, moves)))
-
-
-@compiled
-def costs_at(depth):
-    """Return the cost of a roof point at each `depth` (n,), in blurs.
-
-    Depth is inside the footprint.
-    """
-    costs = np.empty(len(depth))
-    for k in range(len(depth)):
-        costs[k] = cost_at_depth(depth[k], False, STRAY)
-    return costs
-
-
-@compiled
-def slid_costs(xy, costs, lower, pitch, moves):
-    """Return the cost of points `xy` (n, 2) under each of `moves` (m, 2).
-
-    `costs` is a raster whose first node lies at `lower`.
-    """
-    result, nodes_a_metre = np.zeros(len(moves)), 1.0 / pitch
-    (rows, columns), flat = costs.shape, costs.ravel()
-    east, north, place = moves[:, 0].copy(), moves[:, 1].copy(), np.empty(len(moves), np.int64)
-    # all moves of a point at once: four times as fast as all points of a move
-    for k in range(len(xy)):
-        x, y = xy[k]
-        for m in range(len(moves)):
-            i = int((x - east[m] - lower[0]) * nodes_a_metre + 0.5)
-            j = int((y - north[m] - lower[1]) * nodes_a_metre + 0.5)
-            place[m] = min(max(i, 0), rows - 1) * columns + min(max(j, 0), columns - 1)
-        for m in range(len(moves)):
-            result[m] += flat[place[m]]
-    return result
+    grown = shapely.buffer(footprint, overhang, join_style="mitre")
+    cell, best = make_cell(xy[:: max(1, len(xy) // SLID_POINTS)], [grown]), np.zeros(2, int)
+    for step, reach_m in ((COARSE_STEP, FARTHEST_M), (1, COARSE_STEP * RASTER_PITCH_M)):
+        pitches = best + make_shift_grid(step, reach_m)
+        shifts = RASTER_PITCH_M * pitches
+        costs = cell.sums(pitches).sum(axis=0) + 0.1 * (shifts**2).sum(axis=1)
+        best = pitches[int(np.argmin(costs))]
+    return RASTER_PITCH_M * best
 
 
 def by_sides(
