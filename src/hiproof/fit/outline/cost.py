@@ -188,55 +188,37 @@ def cost_at_depth(depth, wall, stray):
 
 
 @compiled
-def evaluate_change(lines, drawing, i, count, new_items, border, limit):
-    """Return the cost of changed `lines`, infinite once it is above `limit`.
+def apply_change(lines, drawing, i, count, new_items, border, limit):
+    """Return the drawing of changed `lines`, whose cost is infinite once it is above `limit`.
 
-    The first `new_items` corners replace the `count` + 1 of the drawing from `i` on.
+    The first `new_items` corners replace the `count` + 1 of the drawing from `i` on. Points away
+    from the corners that come and go cost what they did.
     """
+    kappa, costs = drawing.kappa, drawing.own
     corners = compute_changed_corners(lines, drawing, i, count, new_items, border)
+    none = Drawing(lines, kappa, corners, costs, np.inf, np.inf)
     if len(corners) == 0:
-        return np.inf
+        return none
     nearby = select_points(drawing.corners, corners, i, count, new_items, border)
-    cost = without_points(lines, drawing, corners, border)
+    structure = structure_cost(lines, kappa, border)
+    growth = compute_area(corners) - compute_area(drawing.corners)
+    cost = drawing.cost + border.density * growth + structure - drawing.structure
     for k in nearby:
-        cost -= drawing.own[k]
+        cost -= costs[k]
     if cost > limit:  # no point gains by being there
-        return np.inf
+        return none
     squared, inside = nearest_sides(
         corners, border.x[nearby], border.y[nearby], border.court, SURE_BLURS * border.blur
     )
+    new = np.empty(len(nearby))
     for k in range(len(nearby)):
-        cost += point_cost(squared[k], inside[k], border.wall[nearby[k]], border)
+        new[k] = point_cost(squared[k], inside[k], border.wall[nearby[k]], border)
+        cost += new[k]
         if cost > limit:
-            return np.inf
-    return cost
-
-
-@compiled
-def apply_change(lines, drawing, i, count, new_items, border):
-    """Return the drawing of changed `lines`.
-
-    The first `new_items` corners replace the `count` + 1 of the drawing from `i` on.
-
-    Points away from the corners that come and go cost what they did.
-    """
-    corners, costs = (
-        compute_changed_corners(lines, drawing, i, count, new_items, border),
-        drawing.own.copy(),
-    )
-    if len(corners) == 0:
-        return Drawing(lines, drawing.kappa, corners, costs, np.inf, np.inf)
-    nearby = select_points(drawing.corners, corners, i, count, new_items, border)
-    cost = without_points(lines, drawing, corners, border)
-    squared, inside = nearest_sides(
-        corners, border.x[nearby], border.y[nearby], border.court, SURE_BLURS * border.blur
-    )
-    for k in range(len(nearby)):
-        costs[nearby[k]] = point_cost(squared[k], inside[k], border.wall[nearby[k]], border)
-        cost += costs[nearby[k]] - drawing.own[nearby[k]]
-    return Drawing(
-        lines, drawing.kappa, corners, costs, structure_cost(lines, drawing.kappa, border), cost
-    )
+            return none
+    costs = costs.copy()
+    costs[nearby] = new
+    return Drawing(lines, kappa, corners, costs, structure, cost)
 
 
 @compiled
@@ -278,15 +260,3 @@ def select_points(old, corners, i, count, new_items, border):
         nearby[m] = k
         m += int(x_low - reach < border.x[k] < x_high + reach)
     return nearby[:m]
-
-
-@compiled
-def without_points(lines, drawing, corners, border):
-    """Return the cost of changed lines were points to cost the same."""
-    structure = structure_cost(lines, drawing.kappa, border)
-    return (
-        drawing.cost
-        + border.density * (compute_area(corners) - compute_area(drawing.corners))
-        + structure
-        - drawing.structure
-    )

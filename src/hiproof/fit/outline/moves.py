@@ -12,7 +12,7 @@ import numpy as np
 
 from ...compiled import compiled
 from ...geometry.arrays import copy_row
-from .cost import Drawing, apply_change, evaluate_change, make_drawing
+from .cost import Drawing, apply_change, make_drawing
 from .lines import SAME_RAD, drop_line, quarter_gap, replace_lines, shares_direction
 
 LONGEST_RUN = 3  # lines that become one
@@ -58,44 +58,41 @@ def simplify_drawing(drawing, border, step_m):
     for _ in range(MOST_CHANGES):
         for i in range(len(gains)):
             if gains[i] == np.inf:
-                gains[i] = drawing.cost - best_change(drawing, i, border)[0]
+                gains[i] = drawing.cost - best_change(drawing, i, border)[0].cost
         i = int(np.argmax(gains))
         if gains[i] <= GAIN:
             break
-        cost, lines, count, new_items = best_change(drawing, i, border)
-        gains[i] = drawing.cost - cost  # those of lines far off may be of an earlier drawing
+        new, shift = best_change(drawing, i, border)
+        gains[i] = drawing.cost - new.cost  # those of lines far off may be of an earlier drawing
         if gains[i] <= GAIN:
             continue
-        old_gains, gains = gains, np.full(len(lines), np.inf)
-        for k in range(REACHED + 1, len(lines) - REACHED):
-            gains[k] = old_gains[(i + count + 1 - new_items + k) % len(old_gains)]
-        drawing = shift_first_line(
-            apply_change(lines, drawing, i, count, new_items, border), border, step_m
-        )
+        old_gains, gains = gains, np.full(len(new.lines), np.inf)
+        for k in range(REACHED + 1, len(gains) - REACHED):
+            gains[k] = old_gains[(i + shift + k) % len(old_gains)]
+        drawing = shift_first_line(new, border, step_m)
     return drawing
 
 
 @compiled
 def best_change(drawing, i, border):
-    """Return the cheapest change that begins at line `i`, or none.
+    """Return the cheapest drawing by a change that begins at line `i`, or the drawing as it is.
 
-    It is its cost and the lines, with how many of the old ones the first of them replaces, and how
-    many corners are new. There is none where all are dearer.
+    Line k of the new drawing is line i + `shift` + k of the old one, if both are away from the
+    change.
     """
     n = len(drawing.lines)
-    best, lines, missing, new_items = drawing.cost, drawing.lines, 1, 1
+    best, shift = drawing, 0
     if n > 3:
-        new = drop_line(drawing.lines, i)
-        cost = evaluate_change(new, drawing, i, 1, 1, border, best)
-        if cost < best:
-            best, lines = cost, new
+        new = apply_change(drop_line(drawing.lines, i), drawing, i, 1, 1, border, best.cost)
+        if new.cost < best.cost:
+            best, shift = new, 1
     for count in range(1, min(LONGEST_RUN, n - 2) + 1):
         for azimuth, distance in joint_lines(drawing, i, count):
-            new = replace_lines(drawing.lines, i, count, azimuth, distance)
-            cost = evaluate_change(new, drawing, i, count, 2, border, best)
-            if cost < best:
-                best, lines, missing, new_items = cost, new, count, 2
-    return best, lines, missing, new_items
+            lines = replace_lines(drawing.lines, i, count, azimuth, distance)
+            new = apply_change(lines, drawing, i, count, 2, border, best.cost)
+            if new.cost < best.cost:
+                best, shift = new, count - 1
+    return best, shift
 
 
 @compiled
@@ -198,9 +195,10 @@ def shift_first_line(drawing, border, step):
             lines = drawing.lines.copy()
             lines[0, 1] += sign * step
             is_enough = drawing.cost - GAIN
-            if not evaluate_change(lines, drawing, 0, 1, 2, border, is_enough) < is_enough:
+            new = apply_change(lines, drawing, 0, 1, 2, border, is_enough)
+            if not new.cost < is_enough:
                 break
-            drawing, moved = apply_change(lines, drawing, 0, 1, 2, border), True
+            drawing, moved = new, True
         if moved:
             break
     return drawing

@@ -55,7 +55,7 @@ def step_side(drawing, i, border):
     """Draw side `i` as a flight of steps along its own direction."""
     flight = make_flight(drawing, i, border)
     lines = replaced_by(drawing.lines, i, 1, flight)
-    return apply_change(lines, drawing, i, 1, len(flight) + 1, border)
+    return apply_change(lines, drawing, i, 1, len(flight) + 1, border, np.inf)
 
 
 @compiled
@@ -72,7 +72,7 @@ def step_run(drawing, i, count, border):
         return drawing
     x, y = 0.5 * (start + end)
     joint = replace_lines(drawing.lines, i, count, way, x * math.cos(way) + y * math.sin(way))
-    joined = apply_change(joint, drawing, i, count, 2, border)
+    joined = apply_change(joint, drawing, i, count, 2, border, np.inf)
     return drawing if joined.cost == np.inf else step_side(joined, 0, border)
 
 
