@@ -9,9 +9,9 @@ import shapely
 from benchmarks.compounds import draw_compound
 
 from hiproof.fit.roof import fit_building
-from hiproof.fit.shapes.composite import combine_parts
 from hiproof.fit.shapes.regions import unite_outlines
 from hiproof.fit.shapes.shown import absorb_slivers
+from hiproof.fit.shapes.teeth import unite_saw_teeth
 from hiproof.model import Part, Piece
 from hiproof.primitives import get
 from points_of_roofs import sample_heights
@@ -49,7 +49,7 @@ def test_planes_tell_how_wide_teeth_are(count, seed):
     rng = np.random.default_rng(seed)
     parts = make_seen_row(count, rng.uniform(-3.0, 3.0), rng)
     result = {
-        part.type: part for part in combine_parts([parts[k] for k in rng.permutation(len(parts))])
+        part.type: part for part in unite_saw_teeth([parts[k] for k in rng.permutation(len(parts))])
     }
     assert set(result) == {"shed", "flat"}
     assert result["shed"].parameters["width"] == pytest.approx(count * WIDTH, abs=1e-6)
@@ -67,7 +67,7 @@ def test_a_strip_between_teeth_is_no_roof_of_its_own(kappa):
         make_seen_tooth(1, WIDTH, 2.0 * WIDTH, kappa),
     )
     strip = place_part("flat", {"width": 0.4, "length": LENGTH}, kappa, WIDTH - 0.2, 5.0)
-    (shed,) = combine_parts([original, strip, end])
+    (shed,) = unite_saw_teeth([original, strip, end])
     assert shed.type == "shed"
     assert shed.area == pytest.approx(2.0 * WIDTH * LENGTH, abs=1e-3)
 
@@ -88,7 +88,7 @@ def test_a_row_with_slanted_ends_and_nothing_beside_it_is_one_saw_tooth(kappa):
         tooth = make_seen_tooth(k, k * WIDTH, (k + 1) * WIDTH, kappa)
         outline = shapely.Polygon(np.array(ring) @ np.array([[c, s], [-s, c]]) + [40.0, -7.0])
         row.append(replace(tooth, pieces=(Piece(outline, tooth.pieces[0].planes),)))
-    (shed,) = combine_parts(row)
+    (shed,) = unite_saw_teeth(row)
     assert shed.type == "shed"
     assert shed.area == pytest.approx(unite_outlines(row).area, abs=1e-3)
     assert shed.parameters["width"] == pytest.approx(2.0 * WIDTH, abs=1e-6)

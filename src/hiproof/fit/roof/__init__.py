@@ -34,12 +34,10 @@ from ...primitives.family import name_among
 from ...read.plausible import is_plausible
 from ...settings import CompoundSettings, Settings
 from ..prices import compute_unit
-from ..shapes.clamp import clamp_parts
-from ..shapes.composite import combine_parts
-from ..shapes.curved import fit_curved_shapes
-from ..shapes.custom import fit_custom_shapes
+from ..shapes.curved import fit_shapes
 from ..shapes.regions import exclude_parts, list_polygons
 from ..shapes.shown import find_highest, keep_visible
+from ..shapes.teeth import unite_saw_teeth
 from ..union.fit import BuildingFit
 from ..union.outline import draw_outline
 from ..union.plan import Plan, lay_out_plan
@@ -98,11 +96,10 @@ def fit_building(
     xy = plan.frame.xy_local(np.column_stack(place_nodes(whole.scene, VISIBLE_DEPTH_M)))
     drawn, price = draw_parts(whole, settings)
     visible = keep_visible(drawn, xy)
-    parts = fit_custom_shapes(combine_parts(visible, types), points_local, settings)
-    parts = fit_curved_shapes(parts, plan.points, outline, settings)
+    has_teeth = not types or "shed" in types
+    parts = unite_saw_teeth(visible) if has_teeth else visible
+    parts = fit_shapes(parts, plan.points, outline, settings)
     parts = [restrict_type(part, types, points_local) for part in parts]
-    z_low, z_high = (plan.frame.origin[2] + z for z in (plan.cloud.z.min(), plan.cloud.z.max()))
-    parts = clamp_parts(parts, z_low, z_high, 1.0 / math.sqrt(plan.density))
     if exclude_parts(parts, visible):  # new ones may hide others
         parts = keep_visible(parts, xy, widest_m2=0.0)
     unexplained = measure_unexplained_share(parts, plan, settings.compound.tolerance_m)

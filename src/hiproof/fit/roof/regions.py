@@ -6,9 +6,9 @@ import numpy as np
 import shapely
 
 from ...geometry.rings import intersect, subtract, unite
-from ..shapes.clamp import clip_ring
+from ...primitives.contract import RECTANGLE
 from ..shapes.regions import find_neighbour, list_polygons, widen_gap
-from .draw import Drawing, join_fragments
+from .draw import RING_CORNERS, Drawing, cut, join_fragments
 from .tables import FAR_M, N_SIDES, VOLUME_COUNT, Tables
 
 HIGHER_M = 1e-6  # A volume no more than this (m) below another is not below it.
@@ -155,13 +155,12 @@ def draw_quad(roof: Tables, k: int, outline: shapely.Polygon) -> shapely.Geometr
     """Return the part of an outline inside the sides of volume k."""
     if is_endless(roof, k):
         return outline
-    ring = [(-2 * FAR_M, -2 * FAR_M), (2 * FAR_M, -2 * FAR_M), (2 * FAR_M, 2 * FAR_M)]
-    ring.append((-2 * FAR_M, 2 * FAR_M))
+    rings = np.empty((2, RING_CORNERS, 2))
+    rings[0, :N_SIDES] = 2.0 * FAR_M * np.array(RECTANGLE)
+    size = N_SIDES
     for s in range(N_SIDES):
-        ring = clip_ring(ring, *roof.half_planes[k, s].tolist())
-    if len(ring) < 3:
-        return shapely.Polygon()
-    return intersect(shapely.Polygon(ring), outline)
+        size = cut(rings[0], size, *roof.half_planes[k, s].tolist(), rings[1])
+    return intersect(shapely.Polygon(rings[0, :size]), outline) if size else shapely.Polygon()
 
 
 def is_below(roof: Tables, j: int, k: int, quad: shapely.Geometry) -> bool:

@@ -2,14 +2,12 @@
 
 regions    what parts touch and cover
 shown      hidden parts removed
-composite  gambrels combined from their parts
 teeth      rows of equal monopitches as saw-teeth
 accept     the price of a roof of parts, and the one place that judges shapes
-custom     custom shapes over neighbouring parts
+composite  gambrels and shapes of your own over several parts
 arcs       arcs of the outline
 rounds     cones, spires, domes, onions and half cones over arcs and around the tops of parts
 drums      level discs over arcs and around level parts
 barrels    barrel vaults over parts with slopes to two sides
 curved     these shapes in turn, where they are cheaper
-clamp      heights limited to the range of the points
 """

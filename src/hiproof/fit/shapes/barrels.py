@@ -11,7 +11,7 @@ import shapely
 from ...model import Part
 from ...settings import Settings
 from .accept import PartsRoof
-from .custom import fit_over
+from .composite import fit_over
 from .regions import list_polygons, unite_outlines
 
 # What is made of one.

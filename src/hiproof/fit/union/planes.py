@@ -164,63 +164,6 @@ def fit_plane(cloud, members, start, tau, evidence):
 
 
 @compiled
-def fit_symmetric_gable(cloud, members, planes, tau):
-    """Fit two planes with one shared slope along an axis near `planes` (2, 3).
-
-    Also returns False if they are no gable.
-    """
-    fitted = planes[:2].copy()
-    kind = classify_plane(planes[0])
-    if (kind != 1 and kind != 2) or classify_plane(planes[1]) != kind:
-        return fitted, False
-    k = kind - 1
-    if planes[0, k] * planes[1, k] >= 0.0:
-        return fitted, False
-    sign = 1.0 if planes[0, k] > 0.0 else -1.0
-    x = cloud.u if k == 0 else cloud.v
-    for step in range(4):
-        scale = tau * (2.0 if step == 0 else 1.5 if step == 1 else 1.0)
-        weights, moments, heights = np.zeros(2), np.zeros(2), np.zeros(2)
-        spread = product = 0.0
-        for i in members:
-            z, side = find_lowest_row(fitted, cloud.u[i], cloud.v[i])
-            r = (cloud.z[i] - z) / scale
-            w = 1.0 - r * r
-            if w <= 0.0:
-                continue
-            w *= w
-            s = (sign if side == 0 else -sign) * x[i]
-            weights[side] += w
-            moments[side] += w * s
-            spread += w * s * s
-            heights[side] += w * cloud.z[i]
-            product += w * s * cloud.z[i]
-        if min(weights[0], weights[1]) < 1.0:
-            return fitted, False
-        height, other_height, slope, ok = solve_three(
-            weights[0] + 1e-6,
-            0.0,
-            moments[0],
-            weights[1] + 1e-6,
-            moments[1],
-            spread + 1e-6,
-            heights[0],
-            heights[1],
-            product,
-        )
-        if not ok or not SLOPE_LOW < slope < MAX_SLOPE:
-            return fitted, False
-        fitted[:] = 0.0
-        fitted[0, k], fitted[0, 2], fitted[1, k], fitted[1, 2] = (
-            sign * slope,
-            height,
-            -sign * slope,
-            other_height,
-        )
-    return fitted, True
-
-
-@compiled
 def fit_local_plane(cloud, nearest, count):
     """Fit a plane to the first `count` of `nearest` by least squares.
 
@@ -672,7 +615,7 @@ def fit_whole_roofs(cloud, grid, tau):
 def pool_gables(cloud, grid, pool, tau, evidence):
     """Pool symmetric gables, pyramids and hips (k, PART_PLANES, 3) greedily.
 
-    Also returns their counts of planes. Gables are refitted.
+    Also returns their counts of planes.
     """
     gain = np.empty((len(grid.u) - 1, len(grid.v) - 1))
     mirrored = mirror_gables(pool, grid)
@@ -691,9 +634,5 @@ def pool_gables(cloud, grid, pool, tau, evidence):
         members = select_members(cloud, rectangle)
         copy_rows(gables[k], candidates[m])
         gable_counts[k] = counts[m]
-        if counts[m] == 2:
-            fitted, ok = fit_symmetric_gable(cloud, members, candidates[m], tau)
-            if ok:
-                copy_rows(gables[k], fitted)
         lower_costs(cloud, members, candidates[m, : counts[m]], tau, current)
     return gables, gable_counts
