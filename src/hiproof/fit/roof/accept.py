@@ -46,6 +46,7 @@ CHANGE_MARGIN_M = 0.5  # Distance (m) beyond what a move touches in which corner
 BESIDE_M = NARROW_M - CHANGE_MARGIN_M + 0.02
 FIT_ROUNDS = 2  # Rounds of fitting and choosing points again.
 LEAST_UNITS = 0.05  # What a move must save: fitting again alone saves less.
+HOPE_UNITS = 2.0  # What fitting may still save of a move that does not pay before it.
 LOOP_ROUNDS = 30  # Most rounds of the loop.
 MOST_MOVES = 20_000  # Most moves in a round.
 FIRST_JUDGES = 400  # Most points of a box that judge a move first. Of more, every k-th does.
@@ -124,7 +125,8 @@ def judge(trial, site, drawing, view, boxes, points, weight, costs, units):
     `costs` (n + g,) and `units` are those of the roof as it is.
     """
     limit = weight * costs[points].sum() + site.unit * (units - price_tables(trial))
-    if weight * price_misfit(trial, site, view, points) > limit:
+    hope = limit + HOPE_UNITS * site.unit
+    if weight * price_misfit(trial, site, view, points) > hope:
         return 0.0
     places, count = list_unknowns(trial, site, boxes)
     fit_unknowns(trial, site, view, points, places, count, FIT_ROUNDS)

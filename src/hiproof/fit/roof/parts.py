@@ -12,10 +12,9 @@ import shapely
 
 from ...frames import PlanFrame
 from ...model import Part
-from ...primitives.family import AXIS, SIGN, Member, name_among
+from ...primitives.family import SIGN, Member, name_among
 from ..union.volumes import LEVEL, N_SIDES
 
-EACH = np.arange(N_SIDES)
 LEVEL_EAVE_M = 0.5  # An eave that would be level with its side so little (m) further out is level.
 # Share of the half of its rectangle by which a hidden side may move to where its eave is level.
 HIDDEN_SHARE = 0.8
@@ -85,22 +84,17 @@ def name_planes(
     """
     corners = shapely.get_coordinates(regions) - frame.origin[:2]
     positions = np.column_stack([corners @ axes.T, np.ones(len(corners))])
-    rows = np.where(find_visible_planes(planes.rows, positions)[:, None], planes.rows, np.nan)
-    turn = measure_common_lean(rows)
-    axes = np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]]) @ axes
-    rows = turn_planes(rows, turn) + [0.0, 0.0, frame.origin[2]]
-    sides = [turn_side(side, k, turn) for k, side in enumerate(sides)]
+    is_visible = find_visible_planes(planes.rows, positions)[:, None]
+    rows = np.where(is_visible, planes.rows + [0.0, 0.0, frame.origin[2]], np.nan)
     ends = measure_rectangle(sides, corners @ axes.T)
     known_ends, probed_ends = list_moved_ends(sides, ends)
-    modes = turn_planes(planes.modes, turn)
-    count = 2 + modes.shape[2]
+    count = 2 + planes.covariance.shape[0]
     trial_ends = np.array([ends] * count + known_ends + probed_ends).T
     all_rows = np.repeat(rows[:, :, None], trial_ends.shape[1], axis=2)
-    all_rows[:, :, 2:count] += modes
-    walls = tuple(wall._replace(facing=wall.facing - turn) for wall in planes.walls)
+    all_rows[:, :, 2:count] += planes.modes
     hidden = [k for k, side in enumerate(sides) if side.sigma == math.inf and not side.anchored]
     members = regularise(
-        all_rows, trial_ends, math.atan2(axes[0, 1], axes[0, 0]), walls, hidden, count
+        all_rows, trial_ends, math.atan2(axes[0, 1], axes[0, 0]), planes.walls, hidden, count
     )
     member = members.those(0)
     turns = member.quarter_turns
@@ -128,49 +122,6 @@ def find_visible_planes(rows: np.ndarray, positions: np.ndarray) -> np.ndarray:
     if not is_visible[: LEVEL + 1].any():
         is_visible[np.nanargmin(z[: LEVEL + 1].mean(axis=1))] = True
     return is_visible
-
-
-def measure_common_lean(rows: np.ndarray) -> float:
-    """Return the angle (rad) by which axes must turn for planes to face along them.
-
-    These are a pair of planes that face each other. It is 0 if there is no such pair.
-    """
-    for first, second, axis in ((2, 3, 1), (0, 1, 0)):
-        gradients = [rows[k, :2] for k in (first, second) if np.isfinite(rows[k, 2])]
-        if not gradients:
-            continue
-        angles = [
-            math.remainder(math.atan2(g[1], g[0]) - axis * 0.5 * math.pi, math.pi)
-            for g in gradients
-        ]
-        if len(angles) == 1 or abs(angles[0] - angles[1]) < STRAIGHT:
-            return angles[0]
-    return 0.0
-
-
-def turn_planes(rows: np.ndarray, angle: float) -> np.ndarray:
-    """Return planes (k, 3), or several (k, 3, m), over axes turned by `angle`.
-
-    A plane that then nearly faces along an axis does so exactly.
-    """
-    if angle == 0.0:
-        return rows
-    c, s = math.cos(angle), math.sin(angle)
-    rows = (rows.swapaxes(1, -1) @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])).swapaxes(
-        1, -1
-    )
-    along = rows[EACH, 1 - AXIS]
-    rows[EACH, 1 - AXIS] = np.where(np.abs(along) < 1e-8, 0.0, along)
-    return rows
-
-
-def turn_side(side: Side, edge: int, angle: float) -> Side:
-    """Return the side in axes turned by `angle`."""
-    if angle == 0.0:
-        return side
-    slope = math.atan(side.lean) + (angle if edge < 2 else -angle)
-    scale = math.cos(math.atan(side.lean)) / math.cos(slope)
-    return replace(side, offset=side.offset * scale, lean=math.tan(slope))
 
 
 def measure_rectangle(sides: list[Side], corners: np.ndarray) -> list[float]:
