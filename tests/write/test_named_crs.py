@@ -1,6 +1,7 @@
 """Names of CRSs in files of models: understood, given by hand, and one a file."""
 
 import json
+import warnings
 
 import numpy as np
 import pyogrio
@@ -186,3 +187,14 @@ def test_footprints_whose_crs_is_unknown_are_taken_to_be_in_that_of_the_clouds(
     with pytest.warns(InputWarning, match="names a CRS that PROJ does not know"):
         found = read_footprints(tmp_path / "a.shp", target_crs="EPSG:25832")
     assert found[0].polygon.equals(square)
+
+
+@pytest.mark.parametrize("name, is_other", [("EPSG:25832", False), ("EPSG:25833", True)])
+def test_a_crs_by_hand_of_other_places_than_the_files_is_told(name, is_other, tmp_path):
+    """Who expects a transformation gets models elsewhere."""
+    source = write_gml(tmp_path / "a.gml", name)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        convert(source, tmp_path / "a.city.json", crs="EPSG:25832")
+    told = [str(w.message) for w in caught if "as given, and are not transformed" in str(w.message)]
+    assert len(told) == is_other, told

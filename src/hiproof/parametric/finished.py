@@ -6,12 +6,14 @@ import dataclasses
 import os
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import shapely
+from pyproj import CRS
 
 from ..errors import HiproofError, InputError, warn
 from ..evaluate.metrics import plan_outline
@@ -23,7 +25,7 @@ from ..geometry.rings import repair_polygons, ring_normal, ring_normals
 from ..log import count_things
 from ..masking import mask
 from ..model import GROUND, ROOF, WALL, Building, Face, Model, Part, Piece, Roof, Solid
-from ..read.crs import find_units, parse_crs, read_named_crs
+from ..read.crs import describe_crs, find_units, parse_crs, read_named_crs, same_horizontal
 from ..read.models.cityjson import documents, reference_system
 from ..read.models.damage import Damaged, refuse
 from ..read.models.solids import CITYGML_SUFFIXES, find_citygml_crs, read_building_solids
@@ -93,14 +95,31 @@ def read_file_head(file: Path, record: dict[str, Any], crs: Any = None) -> FileH
     """Read the head of models; their CRS is `crs`, else that of the file, else of `record`."""
     if is_parameters(file):
         with opened_parameters(file) as (head, _):
-            return head if crs is None else dataclasses.replace(head, crs=crs)
-    if crs is not None:
-        return FileHead(crs)
+            return (
+                head
+                if crs is None
+                else dataclasses.replace(head, crs=replace_crs(crs, head.crs, file))
+            )
     if file.suffix.lower() in CITYGML_SUFFIXES:
         name = find_citygml_crs(file)
     else:
         name = reference_system(next(documents(file))[0])
-    return FileHead(read_named_crs(name, file) if name else run_crs(record))
+    if crs is None:
+        return FileHead(read_named_crs(name, file) if name else run_crs(record))
+    with suppress(InputError):  # of a name that PROJ does not know
+        replace_crs(crs, parse_crs(name), file)
+    return FileHead(crs)
+
+
+def replace_crs(crs: CRS, named: CRS | None, file: Path) -> CRS:
+    """Return the CRS given by hand; warns where `file` names one of other places."""
+    if named is not None and not same_horizontal(named, crs):
+        warn(
+            mask(str(file)),
+            f"names {describe_crs(named)}; its coordinates are taken as ones of "
+            f"{describe_crs(crs)}, as given, and are not transformed",
+        )
+    return crs
 
 
 def is_parameters(file: Path) -> bool:
