@@ -310,11 +310,20 @@ def test_global_ids_stay_when_another_building_leaves(gone, run, outputs, tmp_pa
 
 
 def read_mesh_ids(path):
-    """Return the identifiers of the meshes of a 3DM file by name."""
-    ids = {}
-    for item in reader("rhino3dm").File3dm.Read(str(path)).Objects:
+    """Return the identifiers of the meshes and the group of each building of a 3DM file."""
+    ids, document = {}, reader("rhino3dm").File3dm.Read(str(path))
+    for item in document.Objects:
         ids.setdefault(item.Attributes.Name, set()).add(str(item.Attributes.Id))
+    for group in document.Groups:
+        ids[group.Name].add(str(group.Id))
     return ids
+
+
+def test_layers_keep_their_identifiers(run, outputs, tmp_path):
+    convert(run, tmp_path / "a.3dm")
+    read = reader("rhino3dm").File3dm.Read
+    first, second = (read(str(path)) for path in (tmp_path / "a.3dm", outputs("3dm")))
+    assert [layer.Id for layer in first.Layers] == [layer.Id for layer in second.Layers]
 
 
 def test_meshes_keep_their_identifiers_when_another_building_leaves(run, outputs, tmp_path):

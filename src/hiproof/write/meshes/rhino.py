@@ -59,7 +59,7 @@ def write_models(path: Path, buildings: Iterable[ViewedModel], crs: str | None =
 def add_layer(rhino: Any, document: Any, kind: str) -> int:
     """Add the layer of a kind of surface; returns its number."""
     layer = rhino.Layer()
-    layer.Name = kind
+    layer.Name, layer.Id = kind, make_uuid("layer", kind)
     return document.Layers.Add(layer)
 
 
@@ -72,11 +72,11 @@ def add_building(
     keys: PlacedNames,
 ) -> None:
     """Add the meshes of a building."""
+    key = keys.take_at(model.id, model.solid.vertices)
     group = rhino.Group()
-    group.Name = model.id
+    group.Name, group.Id = model.id, make_uuid("group", key)
     document.Groups.Add(group)
     values = merge_values({"id": model.id, "roof_type": model.roof_type}, model.attributes)
-    key = keys.take_at(model.id, model.solid.vertices)
     for (kind, part), faces in model.faces_by_element().items():
         attributes = rhino.ObjectAttributes()
         attributes.Id = make_uuid(kind, f"{key} {part}")
