@@ -50,6 +50,16 @@ def test_secrets_are_masked_in_messages_arguments_and_tracebacks(tmp_path, capsy
     assert output.count("Traceback") == output.count("is odd") == 2 and "s3cret" not in output
 
 
+def test_a_terminal_obeys_no_name(tmp_path, capsys):
+    log.start(file=tmp_path / "run.log")
+    odd = "a\x1b[31m\u202e\x9b\x07"
+    log.LOGGER.error("building %s", odd)
+    warnings.warn(f"{odd} is odd", InputWarning)
+    output = capsys.readouterr().err + (tmp_path / "run.log").read_text(encoding="utf-8")
+    assert output.count(r"a\x1b[31m\u202e\x9b\x07") == 4
+    assert str(InputError(odd)) == r"a\x1b[31m\u202e\x9b\x07"
+
+
 def test_what_other_packages_say_is_for_debugging_alone(tmp_path, capsys):
     """NumPy's warnings and rasterio's remarks in their own words help nobody who did not write
     this.

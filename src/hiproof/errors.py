@@ -21,7 +21,21 @@ class HiproofError(Exception):
     """Base of every error hiproof raises on purpose, a text for the user without traceback."""
 
     def __init__(self, message: str = ""):
-        super().__init__(mask(put_plainly(str(message))))
+        super().__init__(escape_unseen(mask(put_plainly(str(message)))))
+
+
+# Characters that a terminal or a page obeys in place of showing them: controls, and marks of the
+# direction of writing.
+UNSEEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]")
+
+
+def escape_unseen(text: str) -> str:
+    r"""Return a text that shows what a terminal or a page would obey.
+
+    >>> print(escape_unseen("house-\u202e1\x1b[31m"))
+    house-\u202e1\x1b[31m
+    """
+    return UNSEEN.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
 
 
 OS_ERROR = re.compile(r"\[(?:Errno|WinError) (-?\d+)\] ([^:\n;]+)(?:: '[^']*')?")
@@ -140,7 +154,7 @@ class HiproofWarning(UserWarning):
     """Base of the warnings: what was put right on the way, in one sentence."""
 
     def __init__(self, message: str = ""):
-        super().__init__(mask(str(message)))
+        super().__init__(escape_unseen(mask(str(message))))
 
 
 class InputWarning(HiproofWarning):

@@ -17,7 +17,7 @@ from contextlib import suppress
 from enum import StrEnum
 from pathlib import Path
 
-from .errors import HiproofWarning, OutputError
+from .errors import HiproofWarning, OutputError, escape_unseen
 from .masking import mask
 
 LOGGER = logging.getLogger("hiproof")
@@ -49,10 +49,10 @@ def count_things(number: int, item: str, many: str = "") -> str:
 
 
 class Masking(logging.Formatter):
-    """Formats a record and masks the passwords in all of it, tracebacks too."""
+    """Formats a record, tracebacks too: without passwords, and with no control characters."""
 
     def format(self, record: logging.LogRecord) -> str:
-        return mask(super().format(record))
+        return escape_unseen(mask(super().format(record)))
 
 
 class Console(logging.Handler):

@@ -122,6 +122,14 @@ def test_names_from_the_data_cannot_become_markup(run):
     assert json.loads(embed_json(["</script>"])) == ["</script>"]
 
 
+def test_names_that_a_page_would_obey_are_spelled_out(run):
+    """U+202E turns what follows it; some programs obey escape sequences."""
+    odd = replace(run.models[0], id="a\u202eb\x1b[31m")
+    page = report_html(replace(run, models=(odd, *run.models[1:])))
+    assert ">a\\u202eb\\x1b[31m</button>" in page
+    assert not {"\u202e", "\x1b"} & set(page)
+
+
 def test_text_of_the_data_is_not_taken_for_a_place_in_the_page(run):
     page = report_html(run, "<!--data-->")
     assert page.count('"buildings":[') == 1

@@ -2,11 +2,12 @@
 
 import dataclasses
 import warnings
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
 
-from hiproof import SettingsError
+from hiproof import InputError, SettingsError
 from hiproof.frames import LocalFrame
 from hiproof.model import Roof
 from hiproof.settings import ReadSettings
@@ -217,6 +218,28 @@ def test_a_shift_that_is_given_is_taken_off_as_it_is(text, shift):
         found = register_surveys(samples, read)
         assert found.clear_xyz.tolist() == list(shift)
         assert SurveyShift.from_dict(found.to_dict()) == found
+
+
+def register_given(text, **scene):
+    samples = draw_samples(8, [0.0] * 9, (0.0, 0.0, 0.3), **scene)
+    return register_surveys(samples, dataclasses.replace(READ, shift=text))
+
+
+@pytest.mark.parametrize("text, is_wrong", [("0,5,1000", True), ("0,0,-6", True), ("off", False)])
+def test_a_shift_that_roofs_and_ground_contradict_by_metres_is_refused(text, is_wrong):
+    refused = pytest.raises(InputError, match="got 0 of 9 sampled roofs on the earlier ones")
+    with refused if is_wrong else nullcontext():
+        register_given(text).refuse_other_heights("survey of 2024-05-01")
+
+
+@pytest.mark.parametrize("has_ground", [True, False])
+@pytest.mark.parametrize("text, told", [("0,0,2", 1), ("0,0,0.3", 0), ("off", 0)])
+def test_a_shift_that_roofs_and_ground_contradict_is_told(text, told, has_ground):
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        register_given(text, has_ground=has_ground).warn("survey of 2024-05-01")
+    sentences = [str(w.message) for w in caught if "shift that was given puts 0 of 9" in str(w)]
+    assert len(sentences) == told, caught
 
 
 @pytest.mark.parametrize("text", ["", "on", "1,2", "1,2,nan", "1;2;3"])

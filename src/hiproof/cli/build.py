@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from ..errors import escape_unseen
 from ..log import count_things
 from ..progress import show_progress
 from ..settings import Changes
@@ -41,7 +42,7 @@ def build(parameters: Path, *, out: Path, changes: Changes | None = None) -> int
         built = build_file(parameters, out, lambda done: update("build", done), changes)
         write_changes(out)
     for id, reason in built.not_built:
-        click.echo(f"not built: building {id}: {reason}", err=True)
+        click.echo(escape_unseen(f"not built: building {id}: {reason}"), err=True)
     click.echo(
         f"{count_things(built.buildings, 'building')}: "
         + ", ".join(f"{n} {code}" for code, n in built.by_status.most_common())

@@ -11,6 +11,7 @@ from typing import Any
 
 import click
 
+from ..errors import escape_unseen
 from ..log import count_things
 from ..progress import Update, show_progress
 
@@ -95,7 +96,8 @@ def check_file(
         if findings:
             result.findings.append((id, findings))
             result.by_code.update({finding.code for finding in findings})
-            say(f"{path}: {id}: " + "; ".join(finding.message for finding in findings[:3]))
+            text = "; ".join(finding.message for finding in findings[:3])
+            say(escape_unseen(f"{path}: {id}: {text}"))
     result.damaged = left_out.count
     say(result.describe())
     return result

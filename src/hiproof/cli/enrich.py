@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from ..errors import escape_unseen
 from ..log import Level, console_level, count_things
 from ..progress import show_progress
 from ..settings import Changes, EnrichSettings, Settings
@@ -48,7 +49,8 @@ def enrich_folder(run: Path, out: Path | None, settings: EnrichSettings, jobs: i
             run, out, settings, jobs, lambda done, total: update("enrich", done, total)
         )
     for failure in result.failures:
-        click.echo(f"not enriched: building {failure.id}: {failure.reason}", err=True)
+        text = f"not enriched: building {failure.id}: {failure.reason}"
+        click.echo(escape_unseen(text), err=True)
     if console_level() is not Level.error:
         print_result(result, settings)
     return result.exit_code

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from ..errors import escape_unseen
 from ..progress import show_progress
 
 
@@ -24,6 +25,7 @@ def repro(folder: Path, *, out: Path) -> int:
         building, trace = solve_bundle(folder, out)
     if trace:
         click.echo(mask(trace), err=True)
-    click.echo(f"building {building.id}: {building.detail or building.status.value}")
+    text = f"building {building.id}: {building.detail or building.status.value}"
+    click.echo(escape_unseen(text))
     click.echo(f"files: {out}")
     return 1 if building.status is Status.INTERNAL_ERROR else 0

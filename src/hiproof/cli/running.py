@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from ..errors import escape_unseen
 from ..evaluate.overview import Overview, show_command
 from ..log import Level, console_level
 from ..progress import show_progress
@@ -67,7 +68,8 @@ def print_faults(summary: Summary) -> None:
     for name, reason in summary.broken_inputs:
         click.echo(f"{click.style('not read:', fg='red')} {name}: {reason}")
     for id, reason in summary.failures:
-        click.echo(f"{click.style('internal error:', fg='red')} building {id}: {reason}")
+        text = escape_unseen(f"building {id}: {reason}")
+        click.echo(f"{click.style('internal error:', fg='red')} {text}")
 
 
 def print_files(files: Iterable[Path], seconds: Mapping[str, float]) -> None:

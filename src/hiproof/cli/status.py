@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import InputError
+from ..errors import InputError, escape_unseen
 from .running import describe_overview
 
 if TYPE_CHECKING:
@@ -96,6 +96,6 @@ def describe(ledger: Ledger, state: dict[str, Any], folder: str) -> list[str]:
     lines += describe_overview(ledger.overview(), state["by_quality"], folder)
     lines += [f"failed: {name}: {reason}" for name, reason in state["failed_tasks"].items()]
     errors = state["internal_errors"].items()
-    lines += [f"internal error: building {id}: {reason}" for id, reason in errors]
+    lines += [escape_unseen(f"internal error: building {id}: {reason}") for id, reason in errors]
     end = "finished" if state["finished"] else "not finished: run the command again to resume"
     return [*lines, end]

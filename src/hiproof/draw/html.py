@@ -9,6 +9,7 @@ from importlib.resources import files
 
 import numpy as np
 
+from ..errors import escape_unseen
 from ..model import Building, Part
 from ..write.attribute_list import ANGLES
 from .view import (
@@ -29,7 +30,8 @@ MM = 3  # digits of coordinates sent to the page: millimetres
 
 def render_building(building: Building) -> str:
     """Return a building as HTML: its view where it has a solid, status, and parameters."""
-    head = f"<b>{escape(building.id)}</b>: {escape(building.detail or building.status.value)}"
+    text = building.detail or building.status.value
+    head = f"<b>{escape(escape_unseen(building.id))}</b>: {escape(text)}"
     view = render_view(building) if building.built is not None else ""
     style = "font-family:sans-serif;font-size:12px"
     return f'<div style="{style}">{view}<div>{head}</div>{parts_table(building)}</div>'

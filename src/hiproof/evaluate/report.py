@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
+from ..errors import escape_unseen
 from ..log import count_things
 from ..masking import masked_values
 from ..primitives.catalogue import describe_type
@@ -298,5 +299,7 @@ def worst_card(run: EvaluatedRun, index: int, place: int) -> str:
         f"{100 * quality.share_within_20cm:.0f} % of the points inside the outline within 0.2 m of "
         f"the roof; RMSE of all, facades included, {quality.rmse:.2f} m"
     )
-    button = f'<button type="button" data-select="{place}">{escape(model.id)}</button>'
+    button = (
+        f'<button type="button" data-select="{place}">{escape(escape_unseen(model.id))}</button>'
+    )
     return f'<figure class="worst">{pictures}<figcaption>{button} {text}</figcaption></figure>'

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ..errors import escape_unseen
 from ..evaluate.inputs import locate_input
 from ..evaluate.metrics import psd
 from ..evaluate.models import BuildingModel
@@ -96,7 +97,10 @@ def draw_changes(
     if earlier is None or not pairs:
         return "", []
     ids = [run.models[after].id for after, _ in pairs]
-    options = [f'<option value="{number}">{escape(id)}</option>' for number, id in enumerate(ids)]
+    options = [
+        f'<option value="{number}">{escape(escape_unseen(id))}</option>'
+        for number, id in enumerate(ids)
+    ]
     cards = [
         draw_card(run, after, earlier, before, number)
         for number, (after, before) in enumerate(pairs)
@@ -136,7 +140,9 @@ def draw_card(
             ("after", (model, run.points[after])),
         )
     )
-    button = f'<button type="button" data-change="{number}">{escape(model.id)}</button>'
+    button = (
+        f'<button type="button" data-change="{number}">{escape(escape_unseen(model.id))}</button>'
+    )
     caption = f"<figcaption>{button} {escape(text)}</figcaption>"
     return f'<figure class="change">{rows}{caption}</figure>'
 

@@ -153,11 +153,25 @@ class SurveyShift:
         return np.where((np.abs(xyz) > CLEAR_SIGMAS * sigma) & (not self.doubt), xyz, 0.0)
 
     @property
+    def is_contradicted(self) -> bool:
+        """Whether it was given, and most roofs and the ground, if any, lie elsewhere."""
+        is_given = not any(self.sigma) and any(self.xyz)
+        is_off = not self.places or abs(self.ground - self.xyz[2]) > SHIFT_SCALE_M
+        return is_given and is_off and 2 * self.agreeing < self.roofs
+
+    @property
     def rests_on(self) -> str:
         """What the shift rests on, in words."""
         roofs = f"{self.agreeing} of {count_things(self.roofs, 'sampled roof')}"
         places = count_things(self.places, "place")
         return f"the ground at {places} and {roofs}" if self.places else roofs
+
+    @property
+    def misfit(self) -> str:
+        """How the survey lies after a shift that was given, in words."""
+        roofs = f"{self.agreeing} of {count_things(self.roofs, 'sampled roof')} on the earlier ones"
+        off = self.ground - self.xyz[2]
+        return roofs + (f" and the ground {off:+.2f} m off" if self.places else "")
 
     def to_dict(self) -> dict[str, Any]:
         """Return the shift for JSON."""
@@ -177,6 +191,11 @@ class SurveyShift:
                 "Transform them, pass their shift with --shift EAST,NORTH,UP, or --shift off if "
                 "the ground did move"
             )
+        if self.is_contradicted and abs(self.ground - self.xyz[2]) > MOST_GROUND_M:
+            raise InputError(
+                f"{name}: expected --shift to put the survey on the earlier one, got "
+                f"{self.misfit}; leave it out to have it estimated"
+            )
 
     def warn(self, name: str) -> None:
         """Warn (InputWarning) of what the shift of the survey `name` does not explain."""
@@ -184,9 +203,12 @@ class SurveyShift:
         is_estimated, elsewhere = self.sigma[2] > 0 and not self.doubt, self.roofs - self.agreeing
         is_aside = math.hypot(x, y) > USUAL_ASIDE_M
         contradicts_ground = not self.doubt and 2 * self.agreeing < self.roofs and self.places
+        contradicts_ground = contradicts_ground and not self.is_contradicted
         doubts = {
             f"{self.doubt}; no shift is taken off. If the survey is shifted, pass it with --shift "
             "EAST,NORTH,UP": self.doubt,
+            f"the shift that was given puts {self.misfit}. Roofs there count as changed; leave out "
+            "--shift to have it estimated": self.is_contradicted,
             f"{elsewhere} of {self.roofs} sampled roofs lie elsewhere than the ground between the "
             "surveys, so they count as changed; if the ground is wrong, pass the shift of the "
             "survey with --shift EAST,NORTH,UP": contradicts_ground,
