@@ -109,3 +109,9 @@ def test_houses_built_anew_beside_where_they_stood_are_no_shift(run, tmp_path):
     given = {"footprints": str(write_footprints(tmp_path / "new.geojson", outlines))}
     _, classes = update(run, tmp_path / "out", cloud, {"read": {"shift": "off"}}, **given)
     assert classes == {"changed": HOUSES}
+
+
+def test_a_shift_that_was_mistyped_is_refused(run, tmp_path):
+    changes = {"read": {"shift": "0,5,1000"}}
+    with pytest.raises(InputError, match="survey on the earlier one, got 0 of 9 sampled roofs"):
+        update(run, tmp_path / "out", write_later(tmp_path), changes)
