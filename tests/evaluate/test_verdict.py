@@ -187,6 +187,18 @@ def test_a_tower_that_reaches_over_a_place_without_points_is_not_good(width_m, t
     assert sum(good) >= 9 if too_wide_m == 0 else not any(good)
 
 
+@pytest.mark.parametrize("off_m", [-3.0, -2.0, -1.0, 1.0, 2.0, 3.0])
+@pytest.mark.parametrize("high", [9.0, 20.0])
+@pytest.mark.parametrize("density", [2, 5])
+def test_a_tall_step_in_a_wrong_place_is_not_good(off_m, high, density):
+    rng = np.random.default_rng(1)
+    xy = rng.uniform((0, 0), (12, 9), (12 * 9 * density, 2))
+    points = np.column_stack([xy, np.where(xy[:, 0] < 7, 6.0, high) + rng.normal(0, 0.03, len(xy))])
+    step = 7 + off_m
+    assert judge_model(build_blocks((12, 9), (0, step, 6.0), (step, 12, high)), points).reasons
+    assert not judge_model(build_blocks((12, 9), (0, 7, 6.0), (7, 12, high)), points).reasons
+
+
 def test_points_off_along_the_outline_alone_do_not_count():
     """Gutters and what stands beside the walls give a few there, on old houses many."""
     rng = np.random.default_rng(6)

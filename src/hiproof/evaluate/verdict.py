@@ -57,6 +57,10 @@ FEWEST_TILTED = 20  # points of a part from which a slope in their distances is 
 # Height (m) above the roof from which a cluster counts whatever its area; chimneys are lower.
 TALL_M = 3.0
 
+# Height (m) of the roof over a cluster from which that counts wherever LEVEL_M2 of it lie together,
+# though its plan cells hold as many points on the roof: a tall step that stands in a wrong place.
+DEEP_M = 2.0
+
 # Points of a cluster: birds, and echoes that come late, are fewer in one place.
 FEWEST_IN_CLUSTER = 5
 
@@ -212,7 +216,10 @@ def collect_evidence(model: Model, points: np.ndarray, unused: np.ndarray) -> Ev
         near=float(on_roof[mask].sum() / max(len(roof_points), 1)),
         unseen=unseen_share(roof_points, roof.outline),
         above=largest_cluster(seen[inner], z_off[inner], spacing_m, TALL_M),
-        below=largest_cluster(seen, -z_off, spacing_m),
+        below=max(
+            largest_cluster(seen, -z_off, spacing_m),
+            largest_cluster(seen[inner], -z_off[inner], spacing_m, DEEP_M, LEVEL_M2),
+        ),
         tilted_m2=float(sum(tilted)),
         unsupported_m2=float(shown_m2[is_guess].sum()),
         area_m2=area_m2,
@@ -237,12 +244,17 @@ def is_tilted(points: np.ndarray, dz: np.ndarray) -> bool:
 
 
 def largest_cluster(
-    points: np.ndarray, dz: np.ndarray, spacing_m: float, tall_m: float = math.inf
+    points: np.ndarray,
+    dz: np.ndarray,
+    spacing_m: float,
+    tall_m: float = math.inf,
+    tall_m2: float = 0.0,
 ) -> Cluster:
     """Return the largest cluster, tall or level, of points (n, 3) above a roof.
 
     `dz` (n,) is how far they lie above it. It is empty if there is none. A level is where most
-    points lie off the roof. Those from `tall_m` on are a tower, however few of the points there.
+    points lie off the roof. Those from `tall_m` on are a tower, however few of the points there,
+    over `tall_m2` at least.
     """
     result, cell_m = Cluster(), max(LINK_SPACINGS * spacing_m, LINK_M)
     cells = np.floor(points[:, :2] / cell_m)
@@ -250,7 +262,7 @@ def largest_cluster(
     is_off = dz > LEVEL_M
     share = np.bincount(number, is_off) / np.maximum(np.bincount(number), 1)
     is_level = is_off & (share[number] >= MOSTLY_OFF_SHARE)
-    for chosen, least_m2 in ((dz >= tall_m, 0.0), (is_level, LEVEL_M2)):
+    for chosen, least_m2 in ((dz >= tall_m, tall_m2), (is_level, LEVEL_M2)):
         for members in clusters_in_plan(points[chosen], cell_m):
             heights = dz[chosen][members]
             cluster = Cluster(len(members), float(heights.max()), len(members) * spacing_m**2)
