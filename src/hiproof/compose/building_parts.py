@@ -42,7 +42,7 @@ class BuildingPart:
 Borders = dict[tuple[Place, Place], tuple[int, Edge]]  # lid and its edge, by directed plan edge
 
 
-def building_parts(solid: Solid, planarity_m: float = 0.001) -> tuple[BuildingPart, ...]:
+def building_parts(solid: Solid) -> tuple[BuildingPart, ...]:
     """Return the parts of a valid `solid`, that of the lowest member first.
 
     Its roof faces name their roof parts. A solid of one part has none. There are none either where
@@ -63,7 +63,7 @@ def building_parts(solid: Solid, planarity_m: float = 0.001) -> tuple[BuildingPa
     if len(groups) < 2:
         return ()
     parts = [make_part([roofs[k] for k in sorted(group)], find_base(solid)) for group in groups]
-    if any(check_solid(part.solid, planarity_m) for part in parts):
+    if any(check_solid(part.solid) for part in parts):
         return ()
     return tuple(sorted(parts, key=lambda part: min(part.members)))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -42,7 +42,7 @@ def apply_edit(
     action = require_mapping(requested, "an edit").get("action")
     if action not in ACTIONS:
         raise InputError(f"expected an edit ({', '.join(ACTIONS)}), got {action!r:.40}; choose one")
-    parts = ACTIONS[action](record, list_at(record, "parts"), requested, points)
+    parts = ACTIONS[action](Edit(record, list_at(record, "parts"), requested, points))
     result = build(
         {**record, "status": Status.MODELLED.code, "quality": None, "detail": BY_HAND}
         | {"parts": parts},
@@ -54,117 +54,104 @@ def apply_edit(
     return measure_building(result, local) if is_measured and len(local) else result
 
 
-def show_parts(record: Record, parts: list, requested: Record, points: np.ndarray) -> list:
-    """Return the parts unchanged."""
-    return parts
+class Edit(NamedTuple):
+    """The object of a building, its parts, what is requested, and the world points (n, 3)."""
 
+    record: Record
+    parts: list
+    requested: Record
+    points: np.ndarray
 
-def change(record: Record, parts: list, requested: Record, points: np.ndarray) -> list:
-    """Change part `part` by the values of `change`, as `Building.with_part`."""
-    index = part_at(parts, requested, "part")
-    return replace_part(
-        parts,
-        index,
-        changed_part(
-            parts[index],
-            dict(require_mapping(requested.get("change"), "change")),
-            record["origin"][2],
-        ),
-    )
+    def show(self) -> list:
+        """Return the parts unchanged."""
+        return self.parts
 
+    def change(self) -> list:
+        """Change part `part` by the values of `change`, as `Building.with_part`."""
+        index = self.part_at("part")
+        change = dict(require_mapping(self.requested.get("change"), "change"))
+        changed = changed_part(self.parts[index], change, self.record["origin"][2])
+        return replace_part(self.parts, index, changed)
 
-def remove(record: Record, parts: list, requested: Record, points: np.ndarray) -> list:
-    index = part_at(parts, requested, "part")
-    if len(parts) < 2:
-        raise InputError(
-            "expected two or more parts to leave one out, got one; keep it, or change its type"
+    def remove(self) -> list:
+        index = self.part_at("part")
+        if len(self.parts) < 2:
+            raise InputError(
+                "expected two or more parts to leave one out, got one; keep it, or change its type"
+            )
+        return [*self.parts[:index], *self.parts[index + 1 :]]
+
+    def split(self) -> list:
+        """Cut part `part` across `side` at `share` of it."""
+        index, share = self.part_at("part"), number(self.requested.get("share", 0.5), "share")
+        halves = split_part(self.parts[index], self.requested.get("side", "length"), share)
+        return [*self.parts[:index], *halves, *self.parts[index + 1 :]]
+
+    def merge(self) -> list:
+        """Merge parts `part` and `other`, in the place of the first."""
+        first, second = self.part_at("part"), self.part_at("other")
+        if first == second:
+            raise InputError("expected two parts to merge, got one twice; choose another")
+        merged = merged_parts(self.parts[first], self.parts[second])
+        return [merged if k == first else p for k, p in enumerate(self.parts) if k != second]
+
+    def dormer(self) -> list:
+        """Add a dormer to part `part` at `place` [x, y, z] about the origin, or half-way up."""
+        index, roof = self.part_at("part"), read_building(self.record)[1]
+        return (
+            self.parts
+            if roof is None
+            else [*self.parts, add_dormer(roof, index, self.read_click())]
         )
-    return [*parts[:index], *parts[index + 1 :]]
+
+    def recess(self) -> list:
+        """Add a recess to part `index` at `place`, or in its middle."""
+        index, roof = self.part_at("part"), read_building(self.record)[1]
+        return (
+            self.parts if roof is None else with_recess(self.parts, roof, index, self.read_click())
+        )
+
+    def refit(self) -> list:
+        """Fit all parts to the points again but for what is `held`."""
+        roof = read_building(self.record)[1]
+        if roof is None:
+            return self.parts
+        return refit_parts(roof, self.parts, select_inside(roof, self.points), self.read_held())
+
+    def part_at(self, name: str) -> int:
+        """Return the index of a part that an edit names."""
+        index, count = self.requested.get(name), len(self.parts)
+        if not isinstance(index, int) or isinstance(index, bool) or not 0 <= index < count:
+            raise InputError(
+                f"expected {name} from 0 to {count - 1}, got {index!r:.40}; choose one of the parts"
+            )
+        return index
+
+    def read_click(self) -> tuple[float, float] | None:
+        """Read where the roof was clicked, x and y about the origin."""
+        if self.requested.get("place") is None:
+            return None
+        x, y, _ = place(self.requested["place"], "place").tolist()
+        return x, y
+
+    def read_held(self) -> dict[int, tuple[str, ...]]:
+        """Read what a refit holds: names of parameters, and "z", by part."""
+        mapping = require_mapping(self.requested.get("held") or {}, "held")
+        try:
+            return {int(index): tuple(map(str, names)) for index, names in mapping.items()}
+        except (TypeError, ValueError) as error:
+            raise InputError(
+                f"expected held as names by part, got {error}; give part numbers and lists"
+            ) from error
 
 
-def split_part_at(record: Record, parts: list, requested: Record, points: np.ndarray) -> list:
-    """Cut part `part` across `side` at `share` of it."""
-    index = part_at(parts, requested, "part")
-    share = number(requested.get("share", 0.5), "share")
-    return [
-        *parts[:index],
-        *split_part(parts[index], requested.get("side", "length"), share),
-        *parts[index + 1 :],
-    ]
-
-
-def merge(record: Record, parts: list, requested: Record, points: np.ndarray) -> list:
-    """Merge parts `part` and `other`, in the place of the first."""
-    first, second = part_at(parts, requested, "part"), part_at(parts, requested, "other")
-    if first == second:
-        raise InputError("expected two parts to merge, got one twice; choose another")
-    merged = merged_parts(parts[first], parts[second])
-    return [
-        merged if index == first else part for index, part in enumerate(parts) if index != second
-    ]
-
-
-def dormer(record: Record, parts: list, requested: Record, points: np.ndarray) -> list:
-    """Add a dormer to part `part` at `place` [x, y, z] about the origin, or half-way up."""
-    index = part_at(parts, requested, "part")
-    roof = read_building(record)[1]
-    return [*parts, add_dormer(roof, index, read_click(requested))] if roof is not None else parts
-
-
-def recess(record: Record, parts: list, requested: Record, points: np.ndarray) -> list:
-    """Add a recess to part `index` at `place`, or in its middle."""
-    index = part_at(parts, requested, "part")
-    roof = read_building(record)[1]
-    return with_recess(parts, roof, index, read_click(requested)) if roof is not None else parts
-
-
-def read_click(requested: Record) -> tuple[float, float] | None:
-    """Read where the roof was clicked, x and y about the origin."""
-    if requested.get("place") is None:
-        return None
-    x, y, _ = place(requested["place"], "place").tolist()
-    return x, y
-
-
-def refit(record: Record, parts: list, asked: Record, points: np.ndarray) -> list:
-    """Fit all parts to the points again but for what is `held`."""
-    roof = read_building(record)[1]
-    return (
-        parts
-        if roof is None
-        else refit_parts(roof, parts, select_inside(roof, points), read_held(asked))
-    )
-
-
-ACTIONS: dict[str, Callable[[Record, list, Record, np.ndarray], list]] = {
-    "show": show_parts,
-    "change": change,
-    "remove": remove,
-    "split": split_part_at,
-    "merge": merge,
-    "dormer": dormer,
-    "recess": recess,
-    "refit": refit,
+ACTIONS: dict[str, Callable[[Edit], list]] = {
+    "show": Edit.show,
+    "change": Edit.change,
+    "remove": Edit.remove,
+    "split": Edit.split,
+    "merge": Edit.merge,
+    "dormer": Edit.dormer,
+    "recess": Edit.recess,
+    "refit": Edit.refit,
 }
-
-
-def part_at(parts: list, requested: Record, name: str) -> int:
-    """Return the index of a part that an edit names."""
-    index = requested.get(name)
-    if not isinstance(index, int) or isinstance(index, bool) or not 0 <= index < len(parts):
-        raise InputError(
-            f"expected {name} from 0 to {len(parts) - 1}, got {index!r:.40}; choose one of the "
-            "parts"
-        )
-    return index
-
-
-def read_held(requested: Record) -> dict[int, tuple[str, ...]]:
-    """Read what a refit holds: names of parameters, and "z", by part."""
-    mapping = require_mapping(requested.get("held") or {}, "held")
-    try:
-        return {int(index): tuple(map(str, names)) for index, names in mapping.items()}
-    except (TypeError, ValueError) as error:
-        raise InputError(
-            f"expected held as names by part, got {error}; give part numbers and lists"
-        ) from error

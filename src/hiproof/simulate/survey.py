@@ -137,14 +137,14 @@ def assign_classes(cloud: Scan) -> np.ndarray:
     return classes
 
 
-def write_laz(path: Path, clouds: Iterator[Scan], origin: np.ndarray, scale_m: float = 0.01) -> int:
+def write_laz(path: Path, clouds: Iterator[Scan], origin: np.ndarray) -> int:
     """Write clouds to one LAZ 1.4, streamed; return the count, OutputError if it cannot."""
     import laspy
     from pyproj import CRS as ProjCRS
 
     header = laspy.LasHeader(version="1.4", point_format=6)
     header.add_crs(ProjCRS(CRS))
-    header.scales, header.offsets = np.full(3, scale_m), np.floor(origin)
+    header.scales, header.offsets = np.full(3, 0.01), np.floor(origin)
     header.creation_date, header.generating_software = EPOCH, "hiproof simulate"
     count = 0
     try:

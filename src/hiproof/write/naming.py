@@ -8,9 +8,18 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from pyproj import CRS
 
 from ..frames import METRES, Units
 from ..model.installation import CHIMNEY, ROOF_OBJECT
+from ..read.crs import (
+    epsg_code,
+    find_named_units,
+    find_units,
+    horizontal_crs,
+    parse_crs,
+    vertical_crs,
+)
 
 NAMESPACE = uuid.uuid5(uuid.NAMESPACE_DNS, "hiproof")
 # Side (m) of the squares of the plan within which an id names one building, and a file one town: a
@@ -70,10 +79,6 @@ class PlacedNames(UniqueNames):
 
 def crs_name(crs: str) -> str:
     """Return IFC's name of a CRS, "EPSG:28992" of the plan where it has a code."""
-    from pyproj import CRS
-
-    from ..read.crs import epsg_code, horizontal_crs
-
     code = epsg_code(CRS(crs)) or epsg_code(horizontal_crs(CRS(crs)))
     return CRS(crs).name if code is None else f"EPSG:{code}"
 
@@ -96,8 +101,6 @@ def srs_name(crs: Any) -> str | None:
     >>> srs_name("EPSG:26918"), srs_name("EPSG:2193+7839")
     ('urn:ogc:def:crs:EPSG::26918', 'EPSG:2193+7839')
     """
-    from ..read.crs import epsg_code, horizontal_crs, parse_crs, vertical_crs
-
     crs = parse_crs(crs)
     if crs is None:
         return None
@@ -120,8 +123,6 @@ def reference_system(crs: Any) -> str | None:
     >>> reference_system("EPSG:28992+5709"), reference_system(None)
     ('https://www.opengis.net/def/crs/EPSG/0/7415', None)
     """
-    from ..read.crs import epsg_code, horizontal_crs, parse_crs
-
     crs = parse_crs(crs)
     code = None if crs is None else epsg_code(crs) or epsg_code(horizontal_crs(crs))
     return None if code is None else f"https://www.opengis.net/def/crs/EPSG/0/{code}"
@@ -129,8 +130,6 @@ def reference_system(crs: Any) -> str | None:
 
 def plan_wkt(crs: Any) -> str | None:
     """Return WKT of the plan of `crs` for layers without heights, None without one."""
-    from ..read.crs import horizontal_crs, parse_crs
-
     crs = parse_crs(crs)
     return None if crs is None else horizontal_crs(crs).to_wkt()
 
@@ -159,7 +158,6 @@ class FileUnits:
         >>> str(files.gml), str(files.cityjson), str(files.table)
         ('US survey foot, heights in metre', 'US survey foot', 'US survey foot')
         """
-        from ..read.crs import find_named_units, find_units, horizontal_crs, parse_crs
         from .reprojected import choose_file_crs, make_reprojection
 
         world_units = world_units or find_units(parse_crs(crs), "the models")

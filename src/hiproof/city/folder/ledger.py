@@ -15,7 +15,7 @@ import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ...evaluate.overview import BuildingOutcome, Overview
 from ...status import Doubt
@@ -122,30 +122,33 @@ class Ledger:
         )
         self.database = sqlite3.connect(address, uri=True, isolation_level=None, timeout=60)
         if not read_only:
-            self.database.execute("pragma journal_mode=wal")
-            self.database.execute("pragma synchronous=normal")
+            self.run("pragma journal_mode=wal")
+            self.run("pragma synchronous=normal")
             self.database.executescript(SCHEMA)
 
     def close(self) -> None:
         self.database.close()
 
+    def run(self, sql: str, *values: Any) -> sqlite3.Cursor:
+        return self.database.execute(sql, values)
+
     def set(self, **values: str) -> None:
         self.database.executemany("insert or replace into run values (?, ?)", list(values.items()))
 
     def get(self, key: str) -> str | None:
-        row = self.database.execute("select value from run where key = ?", (key,)).fetchone()
+        row = self.run("select value from run where key = ?", key).fetchone()
         return row[0] if row else None
 
     @contextmanager
     def transact(self) -> Iterator[None]:
         """Make all changes of the block, or none."""
-        self.database.execute("begin")
+        self.run("begin")
         try:
             yield
         except BaseException:
-            self.database.execute("rollback")
+            self.run("rollback")
             raise
-        self.database.execute("commit")
+        self.run("commit")
 
     def claim(self, files: list[Claim]) -> None:
         """Enter all files written, and with them that the run is finished."""
@@ -155,7 +158,7 @@ class Ledger:
 
     def claims(self) -> list[Claim]:
         sql = "select name, bytes, digest from output order by name"
-        return list(map(Claim._make, self.database.execute(sql)))
+        return list(map(Claim._make, self.run(sql)))
 
     def settle(
         self, planned: Iterable[tuple[int, str, bytes]], lost: Iterable[str]
@@ -165,7 +168,7 @@ class Ledger:
         The rows of the plan have the position, the work tile and the digest of a building. What is
         known only by files that are `lost` is forgotten. Returns None where nothing is another.
         """
-        run = self.database.execute
+        run = self.run
 
         def count(rows: str) -> int:
             return int(run(f"select count(*) from {rows}").fetchone()[0])
@@ -190,7 +193,7 @@ class Ledger:
     def forget(self) -> None:
         """Drop all that is known of a run."""
         for table in ("run", "task", "building", "output"):
-            self.database.execute(f"delete from {table}")
+            self.run(f"delete from {table}")
 
     def put_tasks(self, clouds: int, tiles: dict[str, int]) -> None:
         """Enter the tasks that sort point files, and those that solve tiles.
@@ -198,8 +201,8 @@ class Ledger:
         `clouds` counts the files, and `tiles` the buildings of each tile. Where buildings
         wait for their points, all files are read again.
         """
-        run, remainder = self.database.execute, self.open_buildings()
-        run("delete from task where kind = 'solve' or ?", (bool(remainder),))
+        run, remainder = self.run, self.open_buildings()
+        run("delete from task where kind = 'solve' or ?", bool(remainder))
         sql = "insert or ignore into task (name, kind, position, buildings) values (?, ?, ?, ?)"
         rows = [(f"sort:{i}", "sort", i, 0) for i in range(clouds)]
         rows += [(f"solve:{tile}", "solve", i, n) for i, (tile, n) in enumerate(tiles.items())]
@@ -211,19 +214,19 @@ class Ledger:
         """Return the buildings to solve by work tile."""
         sql = "select tile, position from building where status is null order by position"
         result: dict[str, list[int]] = {}
-        for tile, position in self.database.execute(sql):
+        for tile, position in self.run(sql):
             result.setdefault(tile, []).append(position)
         return result
 
     def texts(self, tile: str) -> list[tuple[str, int]]:
         """Return where the texts of a tile's buildings are: files, and numbers there."""
         sql = "select file, number from building where tile = ? order by position"
-        return self.database.execute(sql, (tile,)).fetchall()
+        return self.run(sql, tile).fetchall()
 
     def text_files(self) -> list[str]:
         """Return the files with texts of solved buildings."""
         sql = "select distinct file from building where status is not null"
-        return [file for (file,) in self.database.execute(sql)]
+        return [file for (file,) in self.run(sql)]
 
     def open_tasks(self, kind: str) -> list[str]:
         """Return names of the tasks still to do, the largest first.
@@ -234,64 +237,53 @@ class Ledger:
             "select name from task where kind = ? and state = 'open' order by buildings desc, "
             "position"
         )
-        return [name for (name,) in self.database.execute(sql, (kind,))]
+        return [name for (name,) in self.run(sql, kind)]
 
     def start(self, name: str) -> None:
-        self.database.execute("update task set state = 'running' where name = ?", (name,))
+        self.run("update task set state = 'running' where name = ?", name)
 
     def lose(self, name: str) -> None:
         """Record that the process that worked on the task died."""
-        self.database.execute(
-            "update task set state = 'open', losses = losses + 1 where name = ?", (name,)
-        )
+        self.run("update task set state = 'open', losses = losses + 1 where name = ?", name)
 
     def reopen(self) -> None:
         """Reopen what was running when the main process ended.
 
         It was lost with it. Raises sqlite3.DatabaseError for the ledger of another version.
         """
-        columns = {name for _, name, *_ in self.database.execute("pragma table_info(building)")}
+        columns = {name for _, name, *_ in self.run("pragma table_info(building)")}
         if columns != {*Outcome._fields, "tile", "digest"}:
             raise sqlite3.DatabaseError("the columns of another version")
-        self.database.execute(
-            "update task set state = 'open', losses = losses + 1 where state = 'running'"
-        )
+        self.run("update task set state = 'open', losses = losses + 1 where state = 'running'")
 
     def interrupt(self) -> None:
         """Reopen what was running, without a loss.
 
         The main process ends in order.
         """
-        self.database.execute("update task set state = 'open' where state = 'running'")
+        self.run("update task set state = 'open' where state = 'running'")
 
     def sort_again(self) -> None:
         """Open the reading of the point files that were read."""
-        self.database.execute(
-            "update task set state = 'open' where kind = 'sort' and state = 'done'"
-        )
+        self.run("update task set state = 'open' where kind = 'sort' and state = 'done'")
 
     def losses(self, name: str) -> int:
         sql = "select losses from task where name = ?"
-        return self.database.execute(sql, (name,)).fetchone()[0]
+        return self.run(sql, name).fetchone()[0]
 
     def finish(
         self, name: str, state: str, message: str = "", outcomes: Iterable[Outcome] = ()
     ) -> None:
         """Close a task together with the rows of its buildings."""
         sql = "update task set state = ?, message = ?, finished = ? where name = ?"
-        self.database.execute(sql, (state, message, time.time(), name))
+        self.run(sql, state, message, time.time(), name)
         sql = f"update building set ({OUTCOME}) = ({', '.join('?' * 9)}) where position = ?"
         rows = [(*outcome, position) for position, *outcome in outcomes]
         self.database.executemany(sql, rows)
 
-    def outcomes(self) -> dict[int, Outcome]:
-        """Return the outcomes of the buildings that were solved, by position."""
-        sql = f"select {OUTCOME_COLUMNS} from building where status is not null"
-        return {row[0]: Outcome._make(row) for row in self.database.execute(sql)}
-
     def tasks(self) -> list[Task]:
         sql = f"select {', '.join(Task._fields)} from task order by kind, position"
-        return list(map(Task._make, self.database.execute(sql)))
+        return list(map(Task._make, self.run(sql)))
 
     def counts(self, column: str) -> dict[str, int]:
         """Count buildings by `column`, most frequent first.
@@ -299,7 +291,7 @@ class Ledger:
         It is "status", "quality" or "type".
         """
         sql = f"select {column}, count(*) from building group by 1 order by 2 desc, 1"
-        return {key: number for key, number in self.database.execute(sql) if key is not None}
+        return {key: number for key, number in self.run(sql) if key is not None}
 
     def doubts(self) -> dict[Doubt, int]:
         """Count buildings by the doubts in their details.
@@ -307,26 +299,20 @@ class Ledger:
         Doubts that no building has are left out.
         """
         sql = "select count(*) from building where instr(detail, ?)"
-        counts = {
-            doubt: self.database.execute(sql, (doubt.value,)).fetchone()[0] for doubt in Doubt
-        }
+        counts = {doubt: self.run(sql, doubt.value).fetchone()[0] for doubt in Doubt}
         return {doubt: count for doubt, count in counts.items() if count}
 
     def overview(self) -> Overview:
         """Count the buildings modelled so far, how well, and what needs attention."""
-        rows = self.database.execute(
+        rows = self.run(
             "select status, quality, detail, share from building where status is not null"
         )
         return Overview.of(map(BuildingOutcome._make, rows))
 
     def failed_ids(self) -> list[str]:
         """Return the ids of all buildings that hit an internal error."""
-        return [
-            id
-            for (id,) in self.database.execute(
-                "select id from building where status = 'internal_error'"
-            )
-        ]
+        sql = "select id from building where status = 'internal_error'"
+        return [id for (id,) in self.run(sql)]
 
     def failures(self) -> list[Failure]:
         """Return the first 20 buildings that hit an internal error."""
@@ -334,4 +320,4 @@ class Ledger:
             "select id, detail from building where status = 'internal_error' order by position "
             "limit 20"
         )
-        return list(map(Failure._make, self.database.execute(sql)))
+        return list(map(Failure._make, self.run(sql)))

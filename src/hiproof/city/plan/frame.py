@@ -5,13 +5,12 @@ Clouds and footprints name them, and assumptions are made if they do not.
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from ...errors import InputError, InputWarning
+from ...errors import InputError, warn
 from ...frames import Units
 from ...read.crs import (
     combine,
@@ -24,7 +23,7 @@ from ...read.crs import (
 )
 from ...read.crs.positions import doubtful_place, refuse_degrees, stretch
 from ...read.outlines.footprints import footprint_crs
-from ...read.points.pointcloud import PointFileHeader, common_crs, warn_coarse
+from ...read.points.pointcloud import PointFileHeader, common_crs, list_boxes, warn_coarse
 
 # of a unit; files round the US survey foot, which is 2e-6 longer than the foot, to six digits or so
 SAME_UNIT = 1e-5
@@ -69,7 +68,11 @@ def settle_frame(request: Any, headers: list[PointFileHeader]) -> AreaFrame:
         cloud = place_crs(cloud, footprints, headers[0].path, read.unit)
     frame = AreaFrame(cloud, footprints, find_units(cloud or footprints, unit_name=read.unit))
     if cloud is None and (footprints is not None or read.unit == "auto"):
-        log_assumed_crs(headers[0].path, frame)
+        if footprints is None:
+            text = f"its unit is taken as {frame.units}"
+        else:
+            text = f"taken to be in the footprints' {describe_crs(footprints)}"
+        warn(headers[0].path, f"names no CRS; {text}; say otherwise with --crs or --unit")
     warn_coarse(headers, frame.units)
     if frame.crs is not None:
         warn_outside_area_of_use(headers, frame)
@@ -91,7 +94,7 @@ def place_crs(cloud: Any, footprints: Any, path: str, unit: str) -> Any:
         if names_heights_alone(cloud):
             return None
         place = "which is no place on the Earth, and so are the models; say with --crs where it is"
-        warnings.warn(f"{path}: names a local CRS, {describe_crs(cloud)}, {place}", InputWarning)
+        warn(path, f"names a local CRS, {describe_crs(cloud)}, {place}")
         return cloud
     units = find_units(footprints, "the footprints")
     if (
@@ -105,9 +108,7 @@ def place_crs(cloud: Any, footprints: Any, path: str, unit: str) -> Any:
         )
     heights = cloud if names_heights_alone(cloud) else vertical_crs(cloud)
     text = f"taken to be in the footprints' {describe_crs(footprints)}; say otherwise with --crs"
-    warnings.warn(
-        f"{path}: names {describe_crs(cloud)}, which is no place on the Earth; {text}", InputWarning
-    )
+    warn(path, f"names {describe_crs(cloud)}, which is no place on the Earth; {text}")
     return combine(footprints, heights)
 
 
@@ -122,15 +123,13 @@ def warn_outside_area_of_use(headers: list[PointFileHeader], frame: AreaFrame) -
     middles = (bounds[:, :2] + bounds[:, 2:]) / 2
     doubt = doubtful_place(frame.crs, middles)
     if doubt:
-        warnings.warn(
-            f"{headers[0].path}: lies at {doubt}; check the CRS and its unit", InputWarning
-        )
+        warn(headers[0].path, f"lies at {doubt}; check the CRS and its unit")
     elif abs((times := stretch(frame.crs, middles)) - 1.0) > MOST_STRETCH:
-        warnings.warn(
-            f"{headers[0].path}: in {describe_crs(frame.crs)} a metre on the ground is {times:.2f} "
-            "m long there, and so are roofs, but not their heights; reproject clouds and "
-            "footprints to the UTM zone or the national grid",
-            InputWarning,
+        warn(
+            headers[0].path,
+            f"in {describe_crs(frame.crs)} a metre on the ground is {times:.2f} m long there, and "
+            "so are roofs, but not their heights; reproject clouds and footprints to the UTM zone "
+            "or the national grid",
         )
 
 
@@ -139,7 +138,7 @@ def plan_bounds(headers: list[PointFileHeader]) -> np.ndarray:
 
     Those without points are left out.
     """
-    bounds = np.array([header.bounds for header in headers], float).reshape(-1, 6)[:, [0, 1, 3, 4]]
+    bounds = list_boxes(headers)
     return bounds[np.isfinite(bounds).all(axis=1)]
 
 
@@ -160,12 +159,3 @@ def refuse_degrees_in_inputs(
     advice = "reproject them to the UTM zone or the national grid of the place (`pdal translate`)"
     if footprints is None:
         refuse_degrees(plan_bounds(headers), "the point clouds", advice)
-
-
-def log_assumed_crs(path: str, frame: AreaFrame) -> None:
-    """Log once what is assumed where no cloud names a CRS."""
-    if frame.footprints is None:
-        text = f"its unit is taken as {frame.units}"
-    else:
-        text = f"taken to be in the footprints' {describe_crs(frame.footprints)}"
-    warnings.warn(f"{path}: names no CRS; {text}; say otherwise with --crs or --unit", InputWarning)

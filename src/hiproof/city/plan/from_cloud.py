@@ -5,17 +5,16 @@ They come from a cloud of roof points, whose class is known or found.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 
 import numpy as np
 import shapely
 
-from ...errors import InputError, InputWarning
+from ...errors import InputError, warn
 from ...frames import Box, Units
 from ...log import count_things
 from ...model import PointCloud
-from ...read.points.pointcloud import PointFileHeader, iter_points, read_points
+from ...read.points.pointcloud import PointFileHeader, iter_points, list_boxes, read_points
 from ...settings import Settings
 from ..request import Request
 from .classes import choose_classes
@@ -52,11 +51,8 @@ def jobs_from_cloud(
     buildings = split_buildings(cloud, settings, box, progress)
     if settings.read.roofs == "shape" and buildings and buildings[0].is_cut_out:
         roofs = count_things(len(buildings), "roof") if len(buildings) > 1 else "one roof"
-        text = (
-            f"{', '.join(cloud.sources)}: taken for the points of {roofs}, as nothing in it looks "
-            "like ground"
-        )
-        warnings.warn(text, InputWarning)
+        text = f"taken for the points of {roofs}, as nothing in it looks like ground"
+        warn(", ".join(cloud.sources), text)
         settings = choose_classes(settings, roofs="alone")
     return tuple(
         Job(i, item.id, item.area, None, item.error) for i, item in enumerate(buildings)
@@ -69,16 +65,9 @@ def select_clouds(
     """Return the point files to look for buildings in: all, or those near the box."""
     if request.bbox is None:
         return request.clouds
-    box = shapely.box(*box_in_metres(request.bbox, units))
-
-    def is_distant(header: PointFileHeader) -> bool:
-        west, south, _, east, north, _ = header.bounds
-        extent = box_in_metres((west, south, east, north), units)
-        return bool(
-            np.isfinite(extent).all() and shapely.distance(box, shapely.box(*extent)) > MOST_BLOCK_M
-        )
-
-    distant = {header.path for header in headers if is_distant(header)}
+    boxes = units.to_metres(list_boxes(headers).reshape(-1, 2)).reshape(-1, 4)
+    gaps = shapely.distance(shapely.box(*box_in_metres(request.bbox, units)), shapely.box(*boxes.T))
+    distant = {header.path for header, gap in zip(headers, gaps, strict=True) if gap > MOST_BLOCK_M}
     return tuple(name for name in request.clouds if name not in distant)
 
 

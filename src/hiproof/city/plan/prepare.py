@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import shapely
 
-from ...errors import InputError, InputWarning
+from ...errors import InputError, InputWarning, warn
 from ...fit.registration import Registration
 from ...frames import Box, Units
 from ...masking import mask
@@ -76,7 +76,7 @@ def make_plan(request: Request, progress: Progress = lambda *_: None) -> WorkPla
         jobs, neighbours, registration = jobs_from_footprints(request, headers, frame, settings)
         # a warning said where it is coarse when they were read
         operations += list_operations(
-            mask(request.footprints), frame.footprints, frame.cloud, frame, jobs, warn=False
+            mask(request.footprints), frame.footprints, frame.cloud, frame, jobs, is_told=True
         )
     else:
         jobs, settings = jobs_from_cloud(request, headers, frame.units, settings, progress)
@@ -112,11 +112,8 @@ def warn_files_elsewhere(jobs: tuple[Job, ...], crs: Any, units: FileUnits) -> N
     corners = units.gml.from_metres(boxes[np.isfinite(boxes).all(axis=1)].reshape(-1, 2))
     doubt = doubtful_place(crs, corners) if len(corners) else None
     if doubt:
-        warnings.warn(
-            f"--out-crs: the buildings lie at {doubt}; name the UTM zone or the national grid "
-            "there",
-            InputWarning,
-        )
+        text = f"the buildings lie at {doubt}; name the UTM zone or the national grid there"
+        warn("--out-crs", text)
 
 
 def check_terrain(terrain: RasterTerrain, jobs: tuple[Job, ...]) -> None:
@@ -130,16 +127,12 @@ def check_terrain(terrain: RasterTerrain, jobs: tuple[Job, ...]) -> None:
     around = (boxes + np.array([[-VOID_REACH_M], [VOID_REACH_M]])).reshape(-1, 2)
     if not len(corners) or terrain.knows_any(corners) or terrain.knows_any(around):
         return
-    lies = (
-        "has no height under any building"
+    lies, advice = (
+        ("has no height under any building", "values")
         if terrain.pixels_at(corners)[2].any()
-        else "no building stands on it"
+        else ("no building stands on it", "CRS")
     )
-    advice = "its values" if "height" in lies else "its CRS"
-    warnings.warn(
-        f"{mask(terrain.path)}: {lies}, so the ground is taken from the points; check {advice}",
-        InputWarning,
-    )
+    warn(terrain.path, f"{lies}, so the ground is taken from the points; check its {advice}")
 
 
 def list_places(corners: np.ndarray) -> np.ndarray:
@@ -184,7 +177,7 @@ def read_headers(clouds: tuple[str, ...]) -> list:
             else InputError(f"expected points in {', '.join(empty)}, got none; check the files")
         )
     if empty:
-        warnings.warn(f"{empty[0]}{format_others(empty)}: holds no points", InputWarning)
+        warn(f"{empty[0]}{format_others(empty)}", "holds no points")
     return [header for header in headers if header.count]
 
 
@@ -284,7 +277,7 @@ def list_operations(
     target: Any,
     frame: AreaFrame,
     jobs: tuple[Job, ...],
-    warn: bool = True,
+    is_told: bool = False,
 ) -> list[Operation]:
     """Return the operation between two CRSs in plan, at the buildings.
 
@@ -303,23 +296,22 @@ def list_operations(
     x, y = reproject_positions(middle, frame.crs, source)[0]
     place = float(x), float(y)
     operation = find_operation(subject, horizontal_crs(source), horizontal_crs(target), place)
-    if warn:
+    if not is_told:
         warn_if_coarse(operation)
     return [operation]
 
 
-def say_if_columns_run_out(path: str | None, footprints: tuple[Footprint, ...]) -> None:
+def say_if_columns_run_out(path: str, footprints: tuple[Footprint, ...]) -> None:
     """Warn before any work of more attributes than a GeoPackage has columns.
 
     They are the footprints'.
     """
     count = len({name for footprint in footprints for name in footprint.attributes})
     if count > (room := attributes_with_a_column()):
-        warnings.warn(
-            f"{mask(str(path))}: has {count:,} attributes; buildings.gpkg holds the first "
-            f"{room:,}, because its tables have at "
-            "most 2,000 columns, and the other files hold all",
-            InputWarning,
+        warn(
+            path,
+            f"has {count:,} attributes; buildings.gpkg holds the first {room:,}, because its "
+            "tables have at most 2,000 columns, and the other files hold all",
         )
 
 

@@ -12,13 +12,13 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import warnings
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from itertools import product
 
 import numpy as np
 import shapely
 
-from ...errors import InputWarning, raise_interrupt
+from ...errors import InputWarning, raise_interrupt, warn
 from ...fit.registration import (
     FARTHEST_SHIFT_M,
     LEAST_FOOTPRINTS,
@@ -27,11 +27,10 @@ from ...fit.registration import (
 )
 from ...frames import Box, Units
 from ...geometry.grid import number_cells
-from ...masking import mask
 from ...model import Footprint, PointCloud
 from ...read.points.las import is_copc
 from ...read.points.lax import read_lax
-from ...read.points.pointcloud import PointFileHeader, file_kind, iter_points
+from ...read.points.pointcloud import PointFileHeader, file_kind, iter_points, list_boxes
 from ...settings import Settings
 
 SAMPLE_CELL_M = 250.0
@@ -90,7 +89,9 @@ def find_registration(
 
     Points are those of the files with `headers`.
     """
-    boxes = read_boxes(headers, units)
+    boxes = units.to_metres(list_boxes(headers).reshape(-1, 2)).reshape(-1, 4)
+    # the whole plane where a header knows none
+    boxes[~np.isfinite(boxes).all(axis=1)] = [-np.inf, -np.inf, np.inf, np.inf]
     polygons = np.array([f.polygon for f in footprints if not f.polygon.is_empty])
     polygons = polygons[lie_within(polygons, boxes)]
     number_of = footprints_by_cell(polygons)
@@ -123,35 +124,22 @@ def is_suspected(registration: Registration) -> bool:
 
 def warn_if_moved(registration: Registration, path: str) -> None:
     """Warn (InputWarning) where the footprints at `path` are moved, or perhaps should be."""
+    (x, y), sigma = registration.xy, max(registration.sigma)
     if is_suspected(registration):
-        (x, y), sigma = registration.xy, max(registration.sigma)
-        warnings.warn(
-            f"{mask(path)}: all footprints may lie beside their roofs, by ({-x:.2f}, {-y:.2f}) m "
-            f"with a standard deviation of {sigma:.2f} m. The {registration.footprints} used "
-            "show too little to tell, so they are not moved all alike; compare them with the "
-            "cloud, and check the CRS of both",
-            InputWarning,
+        warn(
+            path,
+            f"all footprints may lie beside their roofs, by ({-x:.2f}, {-y:.2f}) m with a standard "
+            f"deviation of {sigma:.2f} m. The {registration.footprints} used show too little to "
+            "tell, so they are not moved all alike; compare them with the cloud, and check the CRS "
+            "of both",
         )
     if registration.is_clear:
-        (x, y), sigma = registration.xy, max(registration.sigma)
-        warnings.warn(
-            f"{mask(path)}: all footprints lie beside their roofs and are moved by ({x:.2f}, "
-            f"{y:.2f}) m, with a standard deviation of {sigma:.2f} m; check the CRS of footprints "
-            "and clouds, or keep them in place with --align off",
-            InputWarning,
+        warn(
+            path,
+            f"all footprints lie beside their roofs and are moved by ({x:.2f}, {y:.2f}) m, with a "
+            f"standard deviation of {sigma:.2f} m; check the CRS of footprints and clouds, or keep "
+            "them in place with --align off",
         )
-
-
-def read_boxes(headers: list[PointFileHeader], units: Units) -> np.ndarray:
-    """Return boxes (n, 4) of point files in world metres.
-
-    It is the whole plane where a header knows none.
-    """
-    bounds = np.array([header.bounds for header in headers], float).reshape(-1, 6)[:, [0, 1, 3, 4]]
-    boxes = units.to_metres(bounds.reshape(-1, 2)).reshape(-1, 4)
-    unknown = ~np.isfinite(boxes).all(axis=1)
-    boxes[unknown] = [-np.inf, -np.inf, np.inf, np.inf]
-    return boxes
 
 
 def lie_within(polygons: np.ndarray, boxes: np.ndarray) -> np.ndarray:
@@ -226,51 +214,35 @@ def points_by_cell(
     The step that sorts points names the others.
     """
     result: dict[Cell, list[np.ndarray]] = {}
-    targets = set(cells)
+    boxes = np.array([expand_cell(cell) for cell in cells])
     for path in paths:
-        for cloud in readable_chunks(path, cells, units):
+        for cloud in readable_chunks(path, boxes, units):
             xy = cloud.xyz[np.isin(cloud.classes, building_classes), :2]
-            for cell, points in split_by_cell(xy, targets):
-                result.setdefault(cell, []).append(points)
+            places, number = number_cells(np.floor(xy / SAMPLE_CELL_M))
+            for k, (i, j) in enumerate(places.tolist()):
+                if (i, j) in cells:
+                    result.setdefault((i, j), []).append(xy[number == k])
     return {cell: np.concatenate(parts) for cell, parts in result.items()}
 
 
-def split_by_cell(xy: np.ndarray, targets: set[Cell]) -> Iterator[tuple[Cell, np.ndarray]]:
-    """Yield the points (n, 2) of each wanted cell among `xy`."""
-    places, number = number_cells(np.floor(xy / SAMPLE_CELL_M))
-    for k, (i, j) in enumerate(places.tolist()):
-        if (i, j) in targets:
-            yield (i, j), xy[number == k]
+def readable_chunks(path: str, boxes: np.ndarray, units: Units) -> Iterator[PointCloud]:
+    """Yield the chunks of a file that may hold points in `boxes` (n, 4), to where it breaks off.
 
-
-def readable_chunks(path: str, cells: list[Cell], units: Units) -> Iterator[PointCloud]:
-    """Yield the chunks of a file that may hold points of the cells.
-
-    They go up to where the file breaks off.
+    Of one with a spatial index it is only what lies near them.
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", InputWarning)  # the step that sorts points says them
         try:
-            for chunks in read_chunks(path, cells, units):
-                yield from chunks
+            is_las = file_kind(path) == "las"
+            if is_las and is_copc(path):
+                for box in boxes:
+                    yield from iter_points(path, box=box, units=units)
+                return
+            index = read_lax(path) if is_las else None
+            near = units.from_metres(boxes.reshape(-1, 2)).reshape(-1, 4)
+            runs = None if index is None else index.find_runs(near)
+            yield from iter_points(path, runs=runs, units=units)
         except MemoryError:
             raise
         except Exception as error:
             raise_interrupt(error)
-
-
-def read_chunks(path: str, cells: list[Cell], units: Units) -> Iterable[Iterator[PointCloud]]:
-    """Return what to read of a file.
-
-    Of one with a spatial index it is only what lies near the cells.
-    """
-    boxes = [expand_cell(cell) for cell in cells]
-    if file_kind(path) != "las":
-        return [iter_points(path, units=units)]
-    if is_copc(path):
-        return (iter_points(path, box=box, units=units) for box in boxes)
-    index = read_lax(path)
-    if index is None:
-        return [iter_points(path, units=units)]
-    file_boxes = units.from_metres(np.array(boxes).reshape(-1, 2)).reshape(-1, 4)
-    return [iter_points(path, runs=index.find_runs(file_boxes), units=units)]

@@ -60,19 +60,20 @@ class RecordedTerrain:
         A row is x, y, the height, and 1 where the raster holds a code for "no data".
         """
         self.source = source
-        self.known = {(x, y): (z, bool(coded)) for x, y, z, coded in rows.tolist()}
+        self.known = {(x, y): (z, coded) for x, y, z, coded in rows.tolist()}
+
+    def rows_at(self, xy_world: np.ndarray) -> np.ndarray:
+        """Return what was recorded (n, 2) at `xy_world` (n, 2)."""
+        rows = [self.known.get((x, y), (np.nan, 0.0)) for x, y in xy_world.tolist()]
+        return np.array(rows, float).reshape(-1, 2)
 
     def height_at(self, xy_world: np.ndarray) -> np.ndarray:
         """Return heights (n,) at `xy_world` (n, 2), NaN where none was recorded."""
-        return np.array(
-            [self.known.get((x, y), (np.nan, False))[0] for x, y in xy_world.tolist()], float
-        )
+        return self.rows_at(xy_world)[:, 0]
 
     def is_coded_at(self, xy_world: np.ndarray) -> np.ndarray:
         """Return whether (n,) the raster held a "no data" code at `xy_world` (n, 2)."""
-        return np.array(
-            [self.known.get((x, y), (np.nan, False))[1] for x, y in xy_world.tolist()], bool
-        )
+        return self.rows_at(xy_world)[:, 1] > 0.0
 
 
 class TerrainRecorder:

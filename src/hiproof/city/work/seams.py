@@ -16,8 +16,8 @@ import numpy as np
 from ...errors import warn
 from ...geometry.thin import thin_to_grid
 from ...log import count_things
-from ...masking import mask
 from .ground import fit_planes
+from .sort import load_files
 
 AROUND, AROUND_M = 8, 3.0  # points of one file that give the ground at a place of the other
 FEWEST_PLACES, ENOUGH_PLACES = 30, 1000  # that show a step, and after which no more are looked at
@@ -40,7 +40,11 @@ def warn_of_steps(points: Path, clouds: Sequence[str]) -> None:
         pairs = [
             pair for pair in combinations(sorted(files), 2) if len(steps[pair]) < ENOUGH_PLACES
         ]
-        ground = {number: load_ground(files[number]) for number in {*chain(*pairs)}}
+        ground = {}
+        for number in {*chain(*pairs)}:
+            loaded = load_files(files[number], ("ground", "low"))
+            has_ground = len(loaded["ground"]) > 0
+            ground[number] = thin_to_grid(loaded["ground" if has_ground else "low"], 1.0)
         for first, second in pairs:
             steps[first, second].extend(measure_steps(ground[first], ground[second]))
     for (first, second), heights in steps.items():
@@ -48,23 +52,12 @@ def warn_of_steps(points: Path, clouds: Sequence[str]) -> None:
         is_alike = high - low < SPREAD * abs(step) or low > APART_M or high < -APART_M
         if len(heights) >= FEWEST_PLACES and abs(step) > STEP_M and is_alike:
             warn(
-                mask(clouds[second]),
+                clouds[second],
                 f"its ground lies {abs(step):.2f} m {'above' if step > 0 else 'below'} that of "
-                f"{mask(clouds[first])}, in {count_things(len(heights), 'place')} where the two "
+                f"{clouds[first]}, in {count_things(len(heights), 'place')} where the two "
                 "meet, so the heights of one are of another system or unit; bring both to one, or "
                 "leave one out",
             )
-
-
-def load_ground(paths: Sequence[Path]) -> np.ndarray:
-    """Load the ground (n, 3) that a point file has in a work tile, or else its lowest points."""
-    found: dict[str, list[np.ndarray]] = {"ground": [], "low": []}
-    for path in paths:
-        with np.load(path) as part:
-            for kind in found.keys() & set(part.files):
-                found[kind].append(part[kind])
-    points = found["ground"] or found["low"] or [np.zeros((0, 3))]
-    return thin_to_grid(np.concatenate(points), 1.0)
 
 
 def measure_steps(first: np.ndarray, second: np.ndarray) -> list[float]:

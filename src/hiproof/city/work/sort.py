@@ -317,11 +317,14 @@ def load_points(root: Path, tile: str, epoch: str = "") -> dict[str, np.ndarray]
     "noise".
     """
     # a name that starts with a dot is what a killed worker left unfinished
-    folder = root / "points" / epoch / tile
-    files = sorted(path for path in folder.glob("*.npz") if not path.name.startswith("."))
-    result: dict[str, list[np.ndarray]] = {kind: [np.zeros((0, 3))] for kind in POINT_KINDS}
+    return load_files(sorted((root / "points" / epoch / tile).glob("[!.]*.npz")))
+
+
+def load_files(files: Iterable[Path], kinds: Sequence[str] = POINT_KINDS) -> dict[str, np.ndarray]:
+    """Load the points (n, 3) of some kinds from files of a work tile."""
+    result: dict[str, list[np.ndarray]] = {kind: [np.zeros((0, 3))] for kind in kinds}
     for path in files:
         with np.load(path) as part:
-            for kind in part.files:
+            for kind in result.keys() & set(part.files):
                 result[kind].append(part[kind])
     return {kind: np.concatenate(arrays) for kind, arrays in result.items()}

@@ -217,6 +217,11 @@ def read_header(path: str | Path) -> PointFileHeader:
     return PointFileHeader(str(path), (*lower.tolist(), *upper.tolist()), count, steps=steps)
 
 
+def list_boxes(headers: list[PointFileHeader]) -> np.ndarray:
+    """Return the boxes (n, 4) in plan that headers state, in the unit of their files."""
+    return np.array([header.bounds for header in headers], float).reshape(-1, 6)[:, [0, 1, 3, 4]]
+
+
 def las_file_header(path: str | Path) -> PointFileHeader | None:
     """Return the header of a LAS, LAZ or COPC file, None for another kind."""
     if file_kind(path) != "las":
