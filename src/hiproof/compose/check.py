@@ -12,8 +12,6 @@ from ..geometry.flat_shell import ON_SEGMENT_M, FlatShell, cross_strictly, weld
 from ..model import Solid
 from .check_faces import FacePlanes, bent_faces, check_faces
 
-OFF_PLANE_M = 2e-4  # m; besides its flatness, how far off a face still counts as on it
-
 
 def check_shell(shell: FlatShell, planes: FacePlanes) -> list[tuple[int, int, int]]:
     """Return the findings of a shell, whose planes are those of `check_faces`."""
@@ -63,75 +61,48 @@ def check_intersections(shell: FlatShell, planes: FacePlanes) -> list[tuple[int,
     starts = shell.ring_start[shell.face_start[:-1]]
     low = np.minimum.reduceat(shell.corners, starts)
     high = np.maximum.reduceat(shell.corners, starts)
-    slack = planes.flatness + OFF_PLANE_M
-    wide = slack[:, None]
-    boxes = shapely.box(*(low - wide)[:, :2].T, *(high + wide)[:, :2].T)
+    slack = planes.slack[:, None]
+    lower, upper = low - slack, high + slack
+    boxes = shapely.box(*lower[:, :2].T, *upper[:, :2].T)
     face, other = shapely.STRtree(boxes).query(boxes)
-    meets = (low[other] <= high[face] + wide[face]) & (low[face] <= high[other] + wide[face])
+    meets = (low[other] <= upper[face]) & (lower[face] <= high[other])
     keep = (face != other) & meets.all(axis=1)
     place, corner = shell.pair_with_corners(other[keep])
     face = face[keep][place]
-    pierces = find_piercing(shell, planes, face, corner, low, high, slack)
-    pairs = np.unique(np.column_stack([face, shell.face_of[corner]])[pierces], axis=0)
-    return [(306, one, two) for one, two in pairs.tolist()]
-
-
-def find_piercing(
-    shell: FlatShell,
-    planes: FacePlanes,
-    face: np.ndarray,
-    corner: np.ndarray,
-    low: np.ndarray,
-    high: np.ndarray,
-    slack: np.ndarray,
-) -> np.ndarray:
-    """Return whether (k,) the edges that begin at `corner` (k,) pierce a `face` (k,).
-
-    `low` and `high` (f, 3) are the faces' boxes, and so far off its plane counts as on a face.
-    Shared vertices do not count.
-    """
-    result = np.zeros(len(face), bool)
     a, b = shell.corners[corner], shell.corners[shell.after[corner]]
-    off = slack[face]
-    above = np.column_stack(
-        [(end * planes.normals[face]).sum(axis=1) - planes.offsets[face] for end in (a, b)]
-    )
-    is_near = (np.minimum(a, b) <= high[face] + off[:, None]).all(axis=1)
-    is_near &= (np.maximum(a, b) >= low[face] - off[:, None]).all(axis=1)
-    is_near &= (above.min(axis=1) <= off) & (above.max(axis=1) >= -off)
-    result[is_near] = pierce(
-        shell, planes, face[is_near], corner[is_near], above[is_near], off[is_near]
-    )
-    return result
+    is_near = (np.minimum(a, b) <= upper[face]) & (np.maximum(a, b) >= lower[face])
+    face, corner = face[is_near.all(axis=1)], corner[is_near.all(axis=1)]
+    pairs = np.column_stack([face, shell.face_of[corner]])[pierce(shell, planes, face, corner)]
+    return [(306, one, two) for one, two in np.unique(pairs, axis=0).tolist()]
 
 
 def pierce(
-    shell: FlatShell,
-    planes: FacePlanes,
-    face: np.ndarray,
-    corner: np.ndarray,
-    above: np.ndarray,
-    slack: np.ndarray,
+    shell: FlatShell, planes: FacePlanes, face: np.ndarray, corner: np.ndarray
 ) -> np.ndarray:
-    """Return whether edges (k,), ends `above` (k, 2) a face's plane, pierce or lie in the face."""
-    on_plane = np.abs(above) <= slack[:, None]
-    in_plane = on_plane.all(axis=1)
-    is_through = ~in_plane & (above.min(axis=1) < -slack) & (above.max(axis=1) > slack)
+    """Return whether (k,) the edges that begin at `corner` (k,) pierce or lie in a `face` (k,).
+
+    Shared vertices do not count.
+    """
+    ends, slack = np.array([corner, shell.after[corner]]), planes.slack[face]
+    rise = (shell.corners[ends] * planes.normals[face]).sum(axis=2) - planes.offsets[face]
+    on_plane = np.abs(rise) <= slack
+    in_plane = on_plane.all(axis=0)
+    is_through = (rise.min(axis=0) < -slack) & (rise.max(axis=0) > slack)
     size = len(shell.index)
     is_shared = np.isin(face * size + shell.edge_of[corner], shell.face_of * size + shell.edge_of)
     size = len(shell.vertices)
     is_own = np.isin(face * size + shell.index[corner], shell.face_of * size + shell.index)
-    p, q = (planes.project(face, shell.corners[k]) for k in (corner, shell.after[corner]))
-    depth = measure_depth(shell, planes, face, p, on_plane[:, 0] & ~is_own)
+    p, q = (planes.project(face, shell.corners[k]) for k in ends)
+    depth = measure_depth(shell, planes, face, p, on_plane[0] & ~is_own)
     result = depth > -ON_SEGMENT_M
-    share = np.where(is_through, above[:, 0] / np.where(is_through, -np.diff(above)[:, 0], 1), 0.5)
+    share = np.where(is_through, rise[0] / np.where(is_through, rise[0] - rise[1], 1), 0.5)
     is_asked = (in_plane & ~is_shared) | is_through
     result |= measure_depth(shell, planes, face, p + share[:, None] * (q - p), is_asked) > slack
     asked = np.flatnonzero(in_plane & ~is_shared & ~result)
     place, edge = shell.pair_with_corners(face[asked])
     asked = asked[place]
-    ends = shell.index[[corner[asked], shell.after[corner[asked]]]]
-    is_apart = (shell.index[edge] != ends) & (shell.index[shell.after[edge]] != ends)
+    others = shell.index[ends[:, asked]]
+    is_apart = (shell.index[edge] != others) & (shell.index[shell.after[edge]] != others)
     crosses = cross_strictly(p[asked], q[asked], planes.flat[edge], planes.flat[shell.after[edge]])
     result[asked[crosses & is_apart.all(axis=0)]] = True
     return result

@@ -7,6 +7,7 @@ constrained Delaunay triangulation, of which two are over 20 degrees apart.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import shapely
@@ -14,6 +15,7 @@ import shapely
 from ..geometry.components import label_components
 from ..geometry.flat_shell import ON_SEGMENT_M, FlatShell, cross_strictly, lies_on
 
+OFF_PLANE_M = 2e-4  # m; besides its flatness, how far off a face still counts as on it
 SMALLEST_RING_M2 = 1e-7  # m2; a ring with less is folded to a line
 SAME_TOUCH_M = 1e-6  # m; touches of two rings that are closer are one
 KEPT_AXES = np.array([(1, 2), (0, 2), (0, 1)])  # of a projection along each axis
@@ -33,6 +35,11 @@ class FacePlanes:
     flatness: np.ndarray
     axes: np.ndarray
     flat: np.ndarray
+
+    @cached_property
+    def slack(self) -> np.ndarray:
+        """How far off its plane (f,) still counts as on a face."""
+        return self.flatness + OFF_PLANE_M
 
     def project(self, faces: np.ndarray, points: np.ndarray) -> np.ndarray:
         """Return points (k, 3) in the projections of `faces` (k,)."""

@@ -56,15 +56,20 @@ def cast_convex(
 
 
 def cast_triangles(
-    xy0: np.ndarray, slope: np.ndarray, triangles: np.ndarray, z_hit: np.ndarray, face: np.ndarray
+    xy0: np.ndarray,
+    slope: np.ndarray,
+    triangles: np.ndarray,
+    z_hit: np.ndarray,
+    face: np.ndarray,
+    first: int,
 ) -> None:
     """Raise `z_hit` where one of `triangles` (m, 3, 3) lies above it.
 
-    `face` gets the triangle's index. Each corner is carried along the beam to z = 0, where the beam
-    is a point: its barycentric weights give the height.
+    `face` gets the triangle's number, from `first` on. Each corner is carried along the beam to
+    z = 0, where the beam is a point: its barycentric weights give the height.
     """
     steepest = np.hypot(*slope.T).max(initial=0.0)
-    for number, corners in enumerate(triangles):
+    for number, corners in enumerate(triangles, first):
         middle = corners.mean(axis=0)
         # a corner lies as far aside as its height carries it along the beam
         off = np.abs(corners - middle)

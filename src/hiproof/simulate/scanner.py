@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -151,80 +152,69 @@ def scan_scene(
     return cloud
 
 
+class Hits(NamedTuple):
+    """What beams meet: the height (n,), its source and its label (n,)."""
+
+    z: np.ndarray
+    source: np.ndarray
+    label: np.ndarray
+
+    def select(self, keep: np.ndarray) -> Hits:
+        return Hits(*(values[keep] for values in self))
+
+
 def returns(scene: Scene, beams: Beams, rng: np.random.Generator, settings: ScanSettings) -> Scan:
     """Return the points of all beams.
 
     A wide beam mixes the heights of two near surfaces and splits over two far ones; leaves catch
     some of the light and let the rest through.
     """
-    z_hit, source, label = first_hits(scene, beams.xy0, beams.slope)
-    n = len(z_hit)
-    xy0, slope, shift = beams.xy0, beams.slope, beams.shift
+    hits = first_hits(scene, beams.xy0, beams.slope)
     if settings.beam_radius_m > 0:
+        n = len(beams)
         perpendicular = rng.normal(0.0, settings.beam_radius_m / 2, (n, 2))
-        z_aside, source_aside, label_aside = first_hits(scene, xy0 + perpendicular, slope)
+        aside = first_hits(scene, beams.xy0 + perpendicular, beams.slope)
         share = rng.uniform(0.5, 1.0, n)
-        mask = np.abs(z_aside - z_hit) < MERGED_RETURNS_M
+        mask = np.abs(aside.z - hits.z) < MERGED_RETURNS_M
         split = np.flatnonzero(~mask & (rng.random(n) < 0.4))
-        z_hit = np.where(mask, share * z_hit + (1 - share) * z_aside, z_hit)
-        z_hit, source, label = (
-            np.concatenate([first, second[split]])
-            for first, second in ((z_hit, z_aside), (source, source_aside), (label, label_aside))
-        )
-        xy0, slope, shift = (
-            np.concatenate([values, values[split]]) for values in (xy0, slope, shift)
-        )
+        hits = hits._replace(z=np.where(mask, share * hits.z + (1 - share) * aside.z, hits.z))
+        hits = Hits(*map(np.append, hits, aside.select(split)))
+        beams = beams.select(np.append(np.arange(n), split))
     if len(scene.crowns):
-        z_hit, source, label, selection = caught_by_leaves(
-            scene, xy0, slope, z_hit, source, label, rng
-        )
-        xy0, slope, shift = xy0[selection], slope[selection], shift[selection]
-    noise = rng.standard_normal((len(z_hit), 3))
-    points = np.empty((len(z_hit), 3))
-    points[:, :2] = xy0 + slope * z_hit[:, None] + settings.horizontal_noise_m * noise[:, :2]
-    points[:, 2] = z_hit + settings.range_noise_m * noise[:, 2]
-    return Scan(points + shift, label, source)
+        hits, beams = catch_by_leaves(scene, beams, hits, rng)
+    noise = rng.standard_normal((len(beams), 3))
+    points = np.empty((len(beams), 3))
+    xy = beams.xy0 + beams.slope * hits.z[:, None]
+    points[:, :2] = xy + settings.horizontal_noise_m * noise[:, :2]
+    points[:, 2] = hits.z + settings.range_noise_m * noise[:, 2]
+    return Scan(points + beams.shift, hits.label, hits.source)
 
 
-def first_hits(
-    scene: Scene, xy0: np.ndarray, slope: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return height (n,), source and label (n,) of beams' first surface, else the terrain."""
-    z_hit = scene.terrain.hit(xy0, slope)
-    source, label = np.full(len(xy0), SOURCE_GROUND, np.int8), np.full(len(xy0), NOT_ROOF, np.int8)
-    bodies = scene.halfspaces, scene.starts, scene.discs
-    convex, triangle = np.full((2, len(xy0)), -1)
-    cast_convex(xy0, slope, *bodies, z_hit, convex)
-    cast_triangles(xy0, slope, scene.triangles, z_hit, triangle)
-    for face, sources, labels in (
-        (convex, scene.source, scene.label),
-        (triangle, scene.triangle_source, scene.triangle_label),
-    ):
-        hit = face >= 0
-        if hit.any():
-            source[hit], label[hit] = sources[face[hit]], labels[face[hit]]
-    return z_hit, source, label
+def first_hits(scene: Scene, xy0: np.ndarray, slope: np.ndarray) -> Hits:
+    """Return what beams meet first, else the terrain."""
+    z_hit, face = scene.terrain.hit(xy0, slope), np.full(len(xy0), -1)
+    cast_convex(xy0, slope, scene.halfspaces, scene.starts, scene.discs, z_hit, face)
+    cast_triangles(xy0, slope, scene.triangles, z_hit, face, len(scene.halfspaces))
+    # the last of the kinds is that of the terrain
+    source, label = np.append(scene.source, SOURCE_GROUND), np.append(scene.label, NOT_ROOF)
+    return Hits(z_hit, source[face].astype(np.int8), label[face].astype(np.int8))
 
 
-def caught_by_leaves(
-    scene: Scene,
-    xy0: np.ndarray,
-    slope: np.ndarray,
-    z_hit: np.ndarray,
-    source: np.ndarray,
-    label: np.ndarray,
-    rng: np.random.Generator,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Add leaves' returns and return their beams; a third return from below, too."""
-    z_crown = np.full(len(xy0), -np.inf)
-    cast_crowns(xy0, slope, scene.crowns, rng.exponential(LEAF_PATH_M, len(xy0)), z_crown)
-    caught = z_crown > z_hit
-    mask = ~caught | (rng.random(len(xy0)) < 0.33)
+def catch_by_leaves(
+    scene: Scene, beams: Beams, hits: Hits, rng: np.random.Generator
+) -> tuple[Hits, Beams]:
+    """Add leaves' returns and their beams; a third return from below, too."""
+    n = len(beams)
+    z_crown = np.full(n, -np.inf)
+    free_path = rng.exponential(LEAF_PATH_M, n)
+    cast_crowns(beams.xy0, beams.slope, scene.crowns, free_path, z_crown)
+    caught = z_crown > hits.z
+    mask = ~caught | (rng.random(n) < 0.33)
     selection = np.concatenate([np.flatnonzero(caught), np.flatnonzero(mask)])
-    leaves = int(caught.sum())
-    z, sources, labels = z_hit[selection], source[selection], label[selection]
-    z[:leaves], sources[:leaves], labels[:leaves] = z_crown[caught], SOURCE_TREE, NOT_ROOF
-    return z, sources, labels, selection
+    leaves, result = int(caught.sum()), hits.select(selection)
+    result.z[:leaves], result.source[:leaves] = z_crown[caught], SOURCE_TREE
+    result.label[:leaves] = NOT_ROOF
+    return result, beams.select(selection)
 
 
 def without_strip(

@@ -56,7 +56,7 @@ class Scene:
     """Bodies in one local frame.
 
     `halfspaces` (k, 4) in bodies `starts` (b + 1) within `discs` (b, 4), `source` and `label` (k,)
-    of each side; `triangles` (m, 3, 3) with their `triangle_source` and `triangle_label`; `crowns`
+    of each side and, after these, of each of the `triangles` (m, 3, 3); `crowns`
     (t, 5); `terrain` the ground below all.
     """
 
@@ -68,8 +68,6 @@ class Scene:
     crowns: np.ndarray = field(default_factory=lambda: np.empty((0, 5)))
     terrain: Plane | Relief = field(default_factory=Plane)
     triangles: np.ndarray = field(default_factory=lambda: np.empty((0, 3, 3)))
-    triangle_source: np.ndarray = field(default_factory=lambda: np.empty(0, np.int8))
-    triangle_label: np.ndarray = field(default_factory=lambda: np.empty(0, np.int8))
 
 
 @dataclass(frozen=True)
@@ -278,8 +276,8 @@ def solids_scene(solids: list[Solid], labels: list[int]) -> Scene:
     return replace(
         make_scene([]),
         triangles=np.concatenate(triangles),
-        triangle_source=np.array(source, np.int8),
-        triangle_label=np.array(label, np.int8),
+        source=np.array(source, np.int8),
+        label=np.array(label, np.int8),
     )
 
 
