@@ -51,20 +51,10 @@ def fit_planes(shell: FlatShell, normals: np.ndarray) -> FacePlanes:
     face_of = shell.face_of
     count = np.maximum(np.bincount(face_of, minlength=shell.faces), 1)[:, None]
     centres = shell.sum_by_face(shell.corners) / count
-    u = np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=1)])
-    u /= np.maximum(np.linalg.norm(u, axis=1, keepdims=True), np.finfo(float).tiny)
-    v = np.cross(normals, u)
     off = shell.corners - centres[face_of]
-    pu, pv, pd = ((off * axis[face_of]).sum(axis=1) for axis in (u, v, normals))
-    products = np.column_stack([pu * pu, pu * pv, pv * pv, pu * pd, pv * pd])
-    uu, uv, vv, ud, vd = shell.sum_by_face(products).T
-    determinant = uu * vv - uv * uv
-    is_wide = determinant > 1e-9 * uu * vv
-    scale = np.where(is_wide, 1.0 / np.where(is_wide, determinant, 1.0), 0.0)
-    turned = normals - (u.T * ((ud * vv - vd * uv) * scale)).T
-    turned -= (v.T * ((vd * uu - ud * uv) * scale)).T
-    length = np.linalg.norm(turned, axis=1, keepdims=True)
-    normals = turned / np.where(length > 0.0, length, 1.0)
+    products = shell.sum_by_face((off[:, :, None] * off[:, None]).reshape(-1, 9))
+    across = np.linalg.eigh(products.reshape(-1, 3, 3))[1][:, :, 0]
+    normals = np.copysign(1.0, (across * normals).sum(axis=1, keepdims=True)) * across
     flatness = np.zeros(shell.faces)
     np.maximum.at(flatness, face_of, np.abs((off * normals[face_of]).sum(axis=1)))
     axes = KEPT_AXES[np.abs(normals).argmax(axis=1)]
