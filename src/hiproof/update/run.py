@@ -66,11 +66,6 @@ def update_area(
     `changes` are settings that differ from the run's, by section. Raises InputError, SettingsError
     or OutputError (full sentences) when the update cannot start or go on; the same call goes on.
     """
-    if Path(request.out).resolve().is_relative_to(Path(request.run).resolve()):
-        raise OutputError(
-            f"expected a folder outside that of the run with --out, got {request.out}; an update "
-            "never changes its run"
-        )
     if not 0 < request.significance < 1:
         raise SettingsError(
             f"expected --significance between 0 and 1, got {request.significance}; 0.001 is usual"
@@ -81,6 +76,11 @@ def update_area(
             f"{request.significance_over}; choose one"
         )
     earlier = read_earlier(request.run)
+    if Path(request.out).resolve().is_relative_to(Path(request.run).resolve()):
+        raise OutputError(
+            f"expected a folder outside that of the run with --out, got {request.out}; an update "
+            "never changes its run"
+        )
     if request.refine and not earlier.clouds:
         raise InputError(
             f"expected the clouds of {request.run} with --refine, which takes the points of both "
