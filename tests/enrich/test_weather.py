@@ -192,6 +192,20 @@ def test_a_sun_half_an_hour_off_comes_with_a_warning(place, said, when, tmp_path
         read_year(str(tmp_path / "wrong/a.epw"))
 
 
+def test_short_days_are_read(tmp_path):
+    """Radiation that begins late and ends early leaves no hour dark between others."""
+
+    def shorten(columns):
+        hours = np.arange(len(columns["ghi"])) % 24
+        for name in ("ghi", "dhi"):
+            columns[name][:] = np.where((hours > 9) & (hours < 15), 200.0, 0.0)
+        columns["dni"][:] = 0.0
+
+    write_epw(tmp_path / "a.epw", change=shorten)
+    weather = read_year(str(tmp_path / "a.epw"))
+    assert (weather.values["ghi"].to_numpy() > 0.0).sum() == 5 * 365
+
+
 def shroud(columns):
     """Dim every day by clouds of its own, so that no hour is too bright for its sun."""
     share = np.repeat(np.random.default_rng(0).uniform(0.2, 0.6, 365), 24)

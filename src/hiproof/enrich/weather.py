@@ -54,7 +54,7 @@ it has to reach: clear skies let 0.7 to 0.8 pass, and every climate has clear ho
 """
 LEAST_STUCK_WM2 = 50.0  # W/m2; in whole ones, winter days of the north have less in equal hours
 FEWEST_EQUAL = 8  # hours with sun from which on two days that are alike in all are copies
-DAYLIGHT_RISE = 0.25  # sine of the sun's elevation (15 degrees) at noon from which no day is dark
+DAYLIGHT_RISE = 0.25  # sine of the sun's elevation (15 degrees) from which no hour is dark
 
 
 class Weather(NamedTuple):
@@ -221,7 +221,7 @@ def refuse_other_sun(weather: Weather, path: str) -> None:
     gaps, excess = np.abs(ghi - dhi - dni * rise), np.maximum(ghi - ceiling * rise, 0.0)
     share = total / float((ceiling * rise).sum())
     is_high = rise > DAYLIGHT_RISE
-    is_dark = (ghi == 0.0) & is_high
+    is_dark = find_gaps(ghi.reshape(-1, 24) > 0.0).ravel() & is_high
     worst = int(np.maximum(np.maximum(gaps, excess), np.maximum(dni - ceiling, 0.0)).argmax())
     if excess.sum() > GREATEST_EXCESS * total or excess[worst] > GREATEST_GAP_WM2:
         got = (
@@ -253,6 +253,13 @@ def refuse_other_sun(weather: Weather, path: str) -> None:
     warn_of_dull_sun(path, float(dhi.sum()) / total, brightness)
     warn_of_moved_sun(weather, rises, path)
     warn_of_repeated_hours(weather, path)
+
+
+def find_gaps(is_lit: np.ndarray) -> np.ndarray:
+    """Return the hours (days, 24) without light between lit ones, or of days without any."""
+    before, after = (np.logical_or.accumulate(x, axis=1) for x in (is_lit, is_lit[:, ::-1]))
+    is_between = before & after[:, ::-1]
+    return ~is_lit & (is_between | ~is_lit.any(axis=1, keepdims=True))
 
 
 def warn_of_dull_sun(path: str, diffuse_share: float, brightness: float) -> None:
