@@ -100,6 +100,17 @@ def test_the_common_shift_is_found_and_areas_are_moved(shifted_request):
         assert np.allclose(distance, np.tile(plan.registration.xy, 2), atol=1e-6)
 
 
+@pytest.mark.parametrize("classes", [{6: 1}, {6: 0, 2: 0}])
+def test_the_common_shift_is_found_where_no_class_marks_roofs(classes, shifted_request, tmp_path):
+    town = move_town(scattered_houses(), -SHIFT)
+    unmarked = np.array([classes.get(c, c) for c in range(7)], np.uint8)[town.classification]
+    request = make_request(tmp_path, replace(town, classification=unmarked), pieces=2)
+    plan = plan_of(request)
+    assert plan.registration.is_clear
+    assert np.abs(plan.registration.xy - SHIFT).max() < 0.1
+    assert plan_of(replace(request, where="id = 'house-7'")).registration == plan.registration
+
+
 def test_the_common_shift_depends_on_the_files_alone(shifted_request, tmp_path):
     registration = plan_of(shifted_request).registration
     box = (*(ORIGIN[:2] + 40), *(ORIGIN[:2] + 120))
@@ -148,6 +159,31 @@ def test_roofs_on_the_border_of_a_sampled_square_are_not_cut(tmp_path):
     assert plan.registration.length < 0.1
 
 
+def move_file(footprints: Path, vector, path: Path) -> None:
+    """Write the footprints of a file beside their places."""
+    meta, _, wkb, _ = pyogrio.raw.read(footprints)
+    wkb = shapely.to_wkb(shapely.transform(shapely.from_wkb(wkb), lambda xy: xy + vector))
+    pyogrio.raw.write(path, wkb, [], [], geometry_type=meta["geometry_type"], crs=meta["crs"])
+
+
+@pytest.mark.skipif(not SHARED.is_dir(), reason="no ../shared/data here")
+@pytest.mark.parametrize("vector", [(0.0, 0.0), (0.94, 0.34), (-2.3, 1.93), (3.06, -2.57)])
+@pytest.mark.parametrize("epoch", ["2010", "2014"])
+def test_known_shifts_are_found_or_told_where_no_class_marks_roofs(epoch, vector, tmp_path):
+    """Class 1 holds roofs and trees along canals."""
+    folder, path = SHARED / "two_epochs", tmp_path / "footprints.gpkg"
+    move_file(folder / "footprints.gpkg", vector, path)
+    clouds = tuple(map(str, sorted((folder / epoch).iterdir())))
+    settings = Settings.from_dict({"read": {"roofs": "shape"}})
+    request = Request(clouds, tmp_path / "out", str(path), settings=settings)
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        registration = make_plan(request).registration
+    assert np.hypot(*np.add(registration.xy, vector)) < 0.3
+    said = [w for w in told if "all footprints" in str(w.message)]
+    assert len(said) == any(vector)
+
+
 @pytest.mark.skipif(not SHARED.is_dir(), reason="no ../shared/data here")
 @pytest.mark.parametrize("distance", [0.5, 0.75])
 @pytest.mark.parametrize("azimuth", range(0, 360, 45))
@@ -155,9 +191,7 @@ def test_known_shifts_of_a_small_set_are_told(distance, azimuth, tmp_path):
     """The border of the cloud cuts 6 of 21 footprints, which were up to 1.2 m off."""
     folder, path = SHARED / "amsterdam_west", tmp_path / "footprints.gpkg"
     vector = distance * np.array([np.sin(np.radians(azimuth)), np.cos(np.radians(azimuth))])
-    meta, _, wkb, _ = pyogrio.raw.read(folder / "footprints_bag.gpkg")
-    wkb = shapely.to_wkb(shapely.transform(shapely.from_wkb(wkb), lambda xy: xy + vector))
-    pyogrio.raw.write(path, wkb, [], [], geometry_type=meta["geometry_type"], crs=meta["crs"])
+    move_file(folder / "footprints_bag.gpkg", vector, path)
     clouds = tuple(map(str, sorted(folder.glob("*.laz"))))
     request = Request(clouds, tmp_path / "out", str(path))
     with pytest.warns(InputWarning, match="all footprints may lie beside their roofs"):

@@ -202,7 +202,7 @@ def jobs_from_footprints(
     bounds = frame.units.to_metres(plan_bounds(headers).reshape(-1, 2)).reshape(-1, 4)
     if len(bounds):
         check_overlap(footprints, bounds.tolist(), frame.footprints, frame.cloud, frame.units)
-    is_part = settings.read.by_class and (request.where or request.bbox)
+    is_part = request.where or request.bbox
     data_set = all_footprints(request, frame, headers) if is_part else footprints
     registration = register_footprints(
         data_set, headers, frame.units, settings, str(request.footprints)

@@ -31,7 +31,7 @@ from ...model import Footprint, PointCloud
 from ...read.points.las import is_copc
 from ...read.points.lax import read_lax
 from ...read.points.pointcloud import PointFileHeader, file_kind, iter_points, list_boxes
-from ...settings import Settings
+from ...settings import ReadSettings, Settings
 
 SAMPLE_CELL_M = 250.0
 """Side (m) of the squares of the world that are sampled: some dozens of houses."""
@@ -53,6 +53,10 @@ also between two files."""
 CELL_MARGIN_M = FARTHEST_SHIFT_M + 1.0
 """How far (m) around a square footprints bear on its points."""
 
+HIGH_M, GROUND_CELL_M = 2.5, 2.0
+"""Height (m) above the ground from which on points may be of roofs where no class marks these, and
+side (m) of the cells in which the ground is looked for."""
+
 Cell = tuple[int, int]
 Point = tuple[float, float]
 
@@ -67,10 +71,10 @@ def register_footprints(
 ) -> Registration | None:
     """Estimate the common shift of footprints; warn where it is clear.
 
-    `path` is that of their file. None where it is not looked for: it is where classes mark roofs.
-    `is_known` says whether something other than roofs shows a shift (m), which then few may show.
+    `path` is that of their file. None where it is not looked for. `is_known` says whether something
+    other than roofs shows a shift (m), which then few may show.
     """
-    if settings.reconstruct.align == "off" or not settings.read.by_class:
+    if settings.reconstruct.align == "off":
         return None
     registration = find_registration(footprints, headers, units, settings)
     if registration.is_likely and is_known(registration.xy):
@@ -96,9 +100,7 @@ def find_registration(
     polygons = polygons[lie_within(polygons, boxes)]
     number_of = footprints_by_cell(polygons)
     cells, files = sample_cells(number_of, boxes)
-    points = points_by_cell(
-        cells, [headers[i].path for i in sorted(files)], units, settings.read.building_classes
-    )
+    points = points_by_cell(cells, [headers[i].path for i in sorted(files)], units, settings.read)
     tree = shapely.STRtree(polygons)
     selected_cells = [cell for cell in cells if cell in points]
 
@@ -207,22 +209,34 @@ def meets(boxes: np.ndarray, box: Box) -> np.ndarray:
 
 
 def points_by_cell(
-    cells: list[Cell], paths: list[str], units: Units, building_classes: tuple[int, ...]
+    cells: list[Cell], paths: list[str], units: Units, read: ReadSettings
 ) -> dict[Cell, np.ndarray]:
     """Return the roof points (n, 2) of the `cells`, of all readable files.
 
-    The step that sorts points names the others.
+    Where no class marks roofs, they are the points high above the ground. The step that sorts
+    points names the files that cannot be read.
     """
+    by_height = read.roofs == "shape"
+    classes = read.building_classes + read.ground_classes * by_height
     result: dict[Cell, list[np.ndarray]] = {}
     boxes = np.array([expand_cell(cell) for cell in cells])
     for path in paths:
         for cloud in readable_chunks(path, boxes, units):
-            xy = cloud.xyz[np.isin(cloud.classes, building_classes), :2]
-            places, number = number_cells(np.floor(xy / SAMPLE_CELL_M))
+            xyz = cloud.xyz[np.isin(cloud.classes, classes), : 3 if by_height else 2]
+            places, number = number_cells(np.floor(xyz[:, :2] / SAMPLE_CELL_M))
             for k, (i, j) in enumerate(places.tolist()):
                 if (i, j) in cells:
-                    result.setdefault((i, j), []).append(xy[number == k])
-    return {cell: np.concatenate(parts) for cell, parts in result.items()}
+                    result.setdefault((i, j), []).append(xyz[number == k])
+    select = select_high if by_height else np.asarray
+    return {cell: select(np.concatenate(parts)) for cell, parts in result.items()}
+
+
+def select_high(xyz: np.ndarray) -> np.ndarray:
+    """Return where (n, 2) points (n, 3) lie high above the ground: trees fit no shift."""
+    from ...classify.ground import ground_grid  # with scipy.ndimage
+
+    height = xyz[:, 2] - ground_grid(xyz, GROUND_CELL_M).height_at(xyz)
+    return xyz[height > HIGH_M, :2]
 
 
 def readable_chunks(path: str, boxes: np.ndarray, units: Units) -> Iterator[PointCloud]:
