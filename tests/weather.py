@@ -1,6 +1,7 @@
 """Weather of a typical year as EPW, TMY3 and PVGIS files."""
 
 import datetime
+import functools
 import json
 
 import numpy as np
@@ -8,6 +9,7 @@ import numpy as np
 NAMES = ("ghi", "dhi", "dni")
 
 
+@functools.cache
 def simulate_weather(latitude=52.0, longitude=4.36, zone=1):
     """Return the middles of a year's hours and their irradiance: every third day is dull."""
     import pandas

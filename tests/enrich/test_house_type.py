@@ -59,14 +59,14 @@ def simulate_street(seed, blocks=24):
 
 def test_types_of_simulated_streets(tmp_path):
     right = total = 0
-    for seed in range(4):
+    for seed in range(2):
         houses, types = simulate_street(seed)
         answers = answer_street(tmp_path / str(seed), houses)
         named = {id: answers[id].attributes["hiproof_house_type"] for id in answers}
         right += sum(named[id] == types[id] for id in types)
         total += len(types)
         assert {named[id] for id in named if id.endswith("garage")} <= {None}
-    assert total > 200 and right >= RIGHT_SHARE * total
+    assert total > 100 and right >= RIGHT_SHARE * total
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hiproof.cli.app import app
+from hiproof.enrich import weather
 from hiproof.enrich.run import enrich_run
 from hiproof.enrich.sun import make_sky
 from hiproof.enrich.weather import read_year
@@ -22,6 +23,23 @@ from weather import write_epw, write_pvgis, write_tmy3
 pvlib = pytest.importorskip("pvlib", reason="needs the extra sun")
 
 DELFT = (52.0, 4.36)
+
+
+RISES = {}
+
+
+@pytest.fixture(autouse=True)
+def remember_the_sun(monkeypatch):
+    """The sun over a place is computed once for all files of its hours."""
+    measure = weather.measure_rises
+
+    def recall(year):
+        key = year.where, year.times.asi8.tobytes()
+        if key not in RISES:
+            RISES[key] = measure(year)
+        return RISES[key]
+
+    monkeypatch.setattr(weather, "measure_rises", recall)
 
 
 @pytest.mark.parametrize(
@@ -202,8 +220,8 @@ def test_short_days_are_read(tmp_path):
         columns["dni"][:] = 0.0
 
     write_epw(tmp_path / "a.epw", change=shorten)
-    weather = read_year(str(tmp_path / "a.epw"))
-    assert (weather.values["ghi"].to_numpy() > 0.0).sum() == 5 * 365
+    year = read_year(str(tmp_path / "a.epw"))
+    assert (year.values["ghi"].to_numpy() > 0.0).sum() == 5 * 365
 
 
 def shroud(columns):
@@ -234,7 +252,7 @@ def test_a_sun_an_hour_off_under_clouds_comes_with_a_warning(hours, moved, tmp_p
         read_year(str(tmp_path / "a.epw"))
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(
     latitude=st.floats(-65, 65),
     longitude=st.floats(-180, 180),

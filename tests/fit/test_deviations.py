@@ -29,7 +29,7 @@ TYPES = (
     "truncated_gable",
 )
 COMPOUNDS = ("L", "T", "U", "cross", "extension", "dormered", "row")
-SCENES = 20
+SCENES = 15
 PARAMETERS = (
     "width",
     "length",
@@ -62,8 +62,8 @@ def measure_scenes(kind):
 @pytest.mark.parametrize("kind", TYPES)
 def test_no_error_of_a_type_is_more_than_three_deviations_in_most_scenes(kind):
     scenes = [[abs(ratio) for _, ratio in scene] for scene in measure_scenes(kind)]
-    assert sum(len(scene) > 0 for scene in scenes) >= 10
-    assert sum(max(scene, default=0.0) <= 3.0 for scene in scenes) >= 17
+    assert sum(len(scene) > 0 for scene in scenes) >= 8
+    assert sum(max(scene, default=0.0) <= 3.0 for scene in scenes) >= 13
 
 
 @pytest.mark.parametrize("name", PARAMETERS)

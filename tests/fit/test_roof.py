@@ -233,7 +233,7 @@ def scan_cluttered_roof(seed):
     return np.column_stack([x, y, z + rng.normal(0.0, 0.03, n)]), shapely.box(0.0, 0.0, 30.0, 22.0)
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(3))
 def test_volumes_are_added_to_a_large_roof_while_its_price_falls(seed, monkeypatch):
     """Else volumes that a roof fitted anew drops again are added without end."""
     prices, list_additions = [], add.list_additions
@@ -264,14 +264,14 @@ def test_a_dormer_is_found_however_dense_the_cloud():
 def test_a_row_of_small_dormers_is_complete():
     """Those that the search misses are copies of others. Each covers ten points a side."""
     missing, outline, places = 0, shapely.box(0.0, 0.0, 36.0, 11.0), np.arange(3.0, 35.0, 4.3)
-    for seed in range(20):
+    for seed in range(8):
         rng = np.random.default_rng([seed, 6])
         x, y = rng.uniform(0.0, 1.0, (2, 2376)) * [[36.0], [11.0]]
         off = np.abs(x[:, None] - places).min(axis=1)
         dormers = np.where((off < 0.9) & (y < 3.2), 8.2 - 2.5 / 0.9 * off, 0.0)
         z = np.maximum(10.0 - np.abs(y - 5.5), dormers) + rng.normal(0.0, 0.03, len(x))
         missing += max(9 - len(fit_building(np.column_stack([x, y, z]), outline).roof_parts), 0)
-    assert missing <= 12  # of 160; without copies 26
+    assert missing <= 5  # of 64; without copies one in six
 
 
 def scan_bent_house(rng):
@@ -296,8 +296,8 @@ def scan_bent_house(rng):
 
 def test_wings_at_an_angle_meet_in_a_hip_and_a_valley():
     counts = []
-    for seed in range(40):
+    for seed in range(16):
         outline, points = scan_bent_house(np.random.default_rng(seed))
         roof = Roof(fit_building(points, outline).roof_parts, outline, FRAME)
         counts.append(len(compose(roof, 0.0).select_faces(ROOF)))
-    assert counts.count(4) >= 39
+    assert counts.count(4) >= 15
