@@ -1,7 +1,8 @@
 """The rules for each face of a shell by itself: val3dity's codes 101 to 208.
 
 A finding is a row (code, face, -1). Bent faces (204) are found by the triangles of their
-constrained Delaunay triangulation, of which two are over 20 degrees apart.
+constrained Delaunay triangulation, of which two are over 20 degrees apart. Rings are compared by
+GEOS, as val3dity does.
 """
 
 from __future__ import annotations
@@ -13,11 +14,10 @@ import numpy as np
 import shapely
 
 from ..geometry.components import label_components
-from ..geometry.flat_shell import ON_SEGMENT_M, FlatShell, cross_strictly, lies_on
+from ..geometry.flat_shell import FlatShell
 
 OFF_PLANE_M = 2e-4  # m; besides its flatness, how far off a face still counts as on it
 SMALLEST_RING_M2 = 1e-7  # m2; a ring with less is folded to a line
-SAME_TOUCH_M = 1e-6  # m; touches of two rings that are closer are one
 KEPT_AXES = np.array([(1, 2), (0, 2), (0, 1)])  # of a projection along each axis
 FLAT_M = 1e-9  # m; a face as flat as this has no bent triangle that is wider
 
@@ -80,66 +80,49 @@ def check_faces(shell: FlatShell, planarity_m: float) -> tuple[np.ndarray, FaceP
     rows = [(code, face) for face, code in enumerate(codes.tolist()) if code]
     rows += [(203, face) for face in np.flatnonzero(is_sound & ~is_planar).tolist()]
     corners = np.bincount(shell.face_of, minlength=shell.faces)
-    pairs = find_contacts(shell, planes.flat, is_sound & (corners > 3))
-    crossing = np.unique(shell.face_of[find_crossing(shell, planes.flat, pairs)])
+    may_cross = is_sound & (corners > 3)
+    crossing = np.unique(shell.face_of_ring[find_crossing_rings(shell, planes.flat, may_cross)])
     is_simple = is_sound.copy()
     is_simple[crossing] = False
     rows += [(104, face) for face in crossing.tolist()]
     for face in np.flatnonzero(is_simple & (np.diff(shell.face_start) > 1)).tolist():
-        rows += [(code, face) for code in check_inner_rings(shell, planes, face, pairs)]
+        rows += [(code, face) for code in check_inner_rings(shell, planes, face)]
     may_bend = is_sound & is_planar & (corners > 3) & (planes.flatness > FLAT_M)
     rows.sort(key=lambda row: row[1])
     found = np.array([(code, face, -1) for code, face in rows], np.int64).reshape(-1, 3)
     return found, planes, np.flatnonzero(may_bend)
 
 
-def find_contacts(shell: FlatShell, flat: np.ndarray, is_asked: np.ndarray) -> np.ndarray:
-    """Return the pairs (2, k) of edges that meet within a face asked for, by first corners."""
-    edges = np.flatnonzero(is_asked[shell.face_of])
-    step = np.ptp(flat[:, 0]) + 1.0  # faces are laid side by side, so that they meet no other
-    places = flat + np.column_stack([shell.face_of * step, np.zeros(len(flat))])
-    lines = shapely.linestrings(np.stack([places[edges], places[shell.after[edges]]], axis=1))
-    tree = shapely.STRtree(lines)
-    one, two = edges[tree.query(lines, predicate="dwithin", distance=ON_SEGMENT_M)]
-    return np.array([one, two])[:, one < two]
+def find_crossing_rings(shell: FlatShell, flat: np.ndarray, is_asked: np.ndarray) -> np.ndarray:
+    """Return rings (k,) of faces asked for that cross, touch or fold back on themselves."""
+    rings = np.flatnonzero(is_asked[shell.face_of_ring])
+    corners = is_asked[shell.face_of]
+    numbers = np.searchsorted(rings, shell.ring_of[corners])
+    return rings[~shapely.is_simple(shapely.linearrings(flat[corners], indices=numbers))]
 
 
-def find_crossing(shell: FlatShell, flat: np.ndarray, pairs: np.ndarray) -> np.ndarray:
-    """Return edges (k,) of rings that cross, touch or fold back on themselves."""
-    one, two = pairs[:, shell.ring_of[pairs[0]] == shell.ring_of[pairs[1]]]
-    is_next, is_before = shell.after[one] == two, shell.after[two] == one
-    one, two = np.where(is_before, two, one), np.where(is_before, one, two)
-    a, b, c = flat[one], flat[two], flat[shell.after[two]]
-    is_folded = lies_on(c, a, b) | lies_on(a, b, c)
-    return one[np.where(is_next | is_before, is_folded, True)]
-
-
-def check_inner_rings(
-    shell: FlatShell, planes: FacePlanes, face: int, pairs: np.ndarray
-) -> list[int]:
+def check_inner_rings(shell: FlatShell, planes: FacePlanes, face: int) -> list[int]:
     """Return the codes of a face's inner rings, at most one a ring."""
     first, last = shell.face_start[face : face + 2].tolist()
     numbers = [np.arange(*shell.ring_start[r : r + 2]) for r in range(first, last)]
     polygons = [shapely.Polygon(planes.flat[corners]) for corners in numbers]
     vertices = [set(shell.index[corners].tolist()) for corners in numbers]
-    touches = find_touches(shell, planes.flat, pairs[:, shell.face_of[pairs[0]] == face])
     result, links = [], np.empty((2, 0), np.int64)
     for r in range(1, last - first):
         code = 0
         for s in range(r):
-            points = touches.get((first + s, first + r), set())
+            touch = shapely.intersection(polygons[s].exterior, polygons[r].exterior)
+            points = shapely.get_num_coordinates(touch)
             labels = label_components(last - first, links)
             if vertices[r] == vertices[s] and len(numbers[r]) == len(numbers[s]):
                 code = 202
-            elif points is None:
+            elif touch.length > 0.0 or polygons[s].overlaps(polygons[r]):
                 code = 201
-            elif len(points) > 1 or (points and labels[r] == labels[s]):
+            elif points > 1 or (points and labels[r] == labels[s]):
                 code = 205
-            elif s == 0 and not is_within(polygons[r], polygons[0]):
+            elif s == 0 and not polygons[0].contains(polygons[r]):
                 code = 206
-            elif s > 0 and (
-                is_within(polygons[r], polygons[s]) or is_within(polygons[s], polygons[r])
-            ):
+            elif s > 0 and (polygons[s].contains(polygons[r]) or polygons[r].contains(polygons[s])):
                 code = 207
             if code:
                 break
@@ -148,31 +131,6 @@ def check_inner_rings(
         if code == 0 and shell.areas[first + r] @ planes.normals[face] > 0:
             code = 208
         result += [code] if code else []
-    return result
-
-
-def is_within(inner: shapely.Polygon, outer: shapely.Polygon) -> bool:
-    """Return whether a ring lies in another one that it does not cross."""
-    return inner.area < outer.area and bool(outer.contains(inner.representative_point()))
-
-
-def find_touches(
-    shell: FlatShell, flat: np.ndarray, pairs: np.ndarray
-) -> dict[tuple[int, int], set[tuple[float, ...]] | None]:
-    """Return where rings touch each other, None where they cross or share a stretch."""
-    one, two = pairs[:, shell.ring_of[pairs[0]] != shell.ring_of[pairs[1]]]
-    a, b, c, d = (flat[k] for k in (one, shell.after[one], two, shell.after[two]))
-    crosses = cross_strictly(a, b, c, d)
-    on = np.stack([lies_on(a, c, d), lies_on(b, c, d), lies_on(c, a, b), lies_on(d, a, b)], axis=1)
-    places = np.round(np.stack([a, b, c, d], axis=1) / SAME_TOUCH_M)
-    result: dict[tuple[int, int], set[tuple[float, ...]] | None] = {}
-    for k, key in enumerate(
-        zip(shell.ring_of[one].tolist(), shell.ring_of[two].tolist(), strict=True)
-    ):
-        points = set(map(tuple, places[k][on[k]].tolist()))
-        known = result.get(key, set())
-        is_crossing = known is None or crosses[k] or len(points) > 1
-        result[key] = None if is_crossing or known is None else known | points
     return result
 
 

@@ -133,11 +133,3 @@ def cross_strictly(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -
     return (np.sign(cross_2d(a, b, c)) * np.sign(cross_2d(a, b, d)) < 0) & (
         np.sign(cross_2d(c, d, a)) * np.sign(cross_2d(c, d, b)) < 0
     )
-
-
-def lies_on(points: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return whether points (n, 2) lie on the segments from a to b (n, 2)."""
-    along = b - a
-    length2 = np.maximum((along**2).sum(axis=1), np.finfo(float).tiny)
-    share = np.clip(((points - a) * along).sum(axis=1) / length2, 0.0, 1.0)
-    return np.linalg.norm(points - a - share[:, None] * along, axis=1) <= ON_SEGMENT_M
