@@ -144,14 +144,14 @@ def test_a_survey_of_bare_ground_alone_is_used_where_its_classes_hold(run, tmp_p
     assert {take_kind(row) for row in after.values()} == {"demolished"}
 
 
-def test_roofs_of_a_class_that_is_not_looked_for_are_not_covered(run, tmp_path):
+def test_roofs_of_a_class_that_is_not_looked_for_are_uncertain(run, tmp_path):
     """All ground under them is hidden, so none of them is gone but the one that was pulled down."""
     town = make_town(seed=7, density=8.0)
     lay_bare(town, "house-1", 0.0)
     town.classification[town.classification == 6] = 67
     after = update(run, tmp_path / "out", town, {"read": {"roofs": "class"}})
     classes = {id: row["change"]["class"] for id, row in after.items()}
-    assert classes == dict.fromkeys(classes, "not_covered") | {"house-1": "gone"}
+    assert classes == dict.fromkeys(classes, "uncertain") | {"house-1": "gone"}
 
 
 def lay_corner_bare(town, id, size):

@@ -15,7 +15,7 @@ from hiproof.update.cells import SurveyNoise, compare_points
 from hiproof.update.judge import is_not_covered
 from hiproof.update.request import UpdateRequest
 from hiproof.update.run import update_area
-from hiproof.update.unseen import find_unseen
+from hiproof.update.unseen import draw_unseen
 from run_records import by_id
 from tiny_town import ORIGIN, make_town, write_cloud, write_footprints
 
@@ -71,19 +71,22 @@ def raise_unclassified(town, inside):
     return dataclasses.replace(town, xyz=up, classification=codes.astype(np.uint8))
 
 
-@pytest.mark.parametrize("change", [hide, raise_unclassified])
+@pytest.mark.parametrize(
+    ("change", "answer"),
+    [(hide, ("not_covered", "unseen")), (raise_unclassified, ("uncertain", "unclear"))],
+)
 @pytest.mark.parametrize(("density", "seed"), [(2.0, 1), (4.0, 2), (8.0, 3), (16.0, 4)])
 def test_a_wing_without_points_of_the_roof_is_not_called_unchanged(
-    run, change, density, seed, tmp_path
+    run, change, answer, density, seed, tmp_path
 ):
     town, wings = make_winged(density, seed)
     wing = wings["house-1"]
     town = change(town, shapely.intersects_xy(wing, *town.xyz[:, :2].T))
     before, after = by_id(run), update(run, tmp_path / "out", town)
     classes = {id: take_class(row) for id, row in after.items()}
-    assert classes == dict.fromkeys(classes, "unchanged") | {"house-1": "not_covered"}
+    assert classes == dict.fromkeys(classes, "unchanged") | {"house-1": answer[0]}
     (place,) = after["house-1"]["change"]["places"]
-    assert place["kind"] == "unseen"
+    assert place["kind"] == answer[1]
     assert place["area"] == pytest.approx(wing.area, rel=0.35)
     assert after["house-1"]["parts"] == before["house-1"]["parts"]
 
@@ -113,6 +116,33 @@ def test_a_house_that_the_survey_hardly_covers_has_a_place(run, kept, tmp_path):
     assert place["area"] == pytest.approx(area_m2, rel=0.25)
 
 
+@pytest.mark.parametrize("density", [1.0, 4.0, 12.0])
+@pytest.mark.parametrize("through", [0.0, 0.15, 0.4])
+def test_a_survey_covers_the_rubble_of_a_house(run, through, density, tmp_path):
+    """Whatever share of the pulses reaches the ground."""
+    town, _ = make_winged(density, 4)
+    rng, outline = np.random.default_rng(5), town.footprints["house-2"]
+    inside = shapely.intersects_xy(outline.buffer(0.5), *town.xyz[:, :2].T)
+    town.xyz[inside, 2] = ORIGIN[2] + rng.uniform(0.0, 7.0, inside.sum())
+    on_ground = inside & (rng.random(len(inside)) < through)
+    town.xyz[on_ground, 2] = ORIGIN[2]
+    town.classification[inside] = np.where(on_ground, 2, 1)[inside]
+    after = update(run, tmp_path / "out", town)
+    classes = {id: take_class(row) for id, row in after.items()}
+    assert classes.pop("house-2") == ("gone" if through else "uncertain")
+    assert set(classes.values()) == {"unchanged"}
+
+
+def test_a_survey_that_covers_no_building_is_told(run, tmp_path):
+    town, _ = make_winged(4.0, 4)
+    boxes = shapely.buffer(list(town.footprints.values()), 2.0)
+    town = hide(town, shapely.intersects_xy(shapely.union_all(boxes), *town.xyz[:, :2].T))
+    town.classification[:50] = 6
+    with pytest.warns(UserWarning, match="got clouds that cover none;"):
+        after = update(run, tmp_path / "out", town)
+    assert {take_class(row) for row in after.values()} == {"not_covered"}
+
+
 @pytest.mark.parametrize("seed", [7, 8])
 def test_a_changed_house_also_names_its_unseen_wing(run, seed, tmp_path):
     town, wings = make_winged(6.0, seed)
@@ -137,7 +167,8 @@ def find(roof, old, new):
     comparison = compare_points(roof, old, new, SurveyNoise())
     if is_not_covered(comparison, roof):
         return None
-    return sum(place.area_m2 for place in find_unseen(roof, comparison))
+    place = draw_unseen(roof, comparison)
+    return 0.0 if place is None else place.area
 
 
 @pytest.mark.parametrize("has_old", [True, False])

@@ -144,6 +144,12 @@ def report_changes(request: UpdateRequest, state: Path, summary: Summary) -> Upd
             "`hiproof report`, and pass its shift with --shift EAST,NORTH,UP",
             InputWarning,
         )
+    if by_change[Change.NOT_COVERED.code] == summary.buildings:
+        warnings.warn(
+            f"expected new clouds that cover buildings of {request.run}, got clouds that cover none"
+            "; check their place and CRS, and the class of their roofs (--building-class)",
+            InputWarning,
+        )
     by_change[Change.UNCHANGED.code] = summary.buildings - len(found)
     by_kind = Counter(
         change.record["change"]["places"][0]["kind"]

@@ -146,18 +146,21 @@ class Updater:
         if roof is None or verdict is None:
             return self.revisit_empty(job, member, earlier)
         is_gone = verdict.change is Change.GONE
-        unseen = [] if is_gone else find_unseen(roof, verdict.comparison)
+        unseen = [] if is_gone else find_unseen(roof, verdict, self.epochs.new)
         if verdict.change is Change.UNCHANGED and member.is_same_outline and not unseen:
             kept = self.refine(job, member.record) if self.surveys.refine else None
             kept = kept or keep_texts(earlier, member.record, self.texts)
             if kept is not None:
                 return kept
         earlier = with_model(earlier, roof, self.plan.settings.compose)
-        lost = LostParts.find(verdict, roof)
+        lost, places = LostParts.find(verdict, roof), record_places(unseen, roof.frame)
+        is_hidden = any(place.kind is ChangeKind.UNCLEAR for place in unseen)
+        hardly_seen = Change.UNCERTAIN if is_hidden else Change.NOT_COVERED
+        if verdict.change is Change.NOT_COVERED:
+            return self.mark(earlier, hardly_seen, verdict.chance, places, member)
         result = self.follow_verdict(job, member, earlier, verdict, lost)
-        places = record_places(unseen, roof.frame)
         if places and result is earlier:
-            return self.mark(earlier, Change.NOT_COVERED, verdict.chance, places, member)
+            return self.mark(earlier, hardly_seen, verdict.chance, places, member)
         if places and result.change:
             change = result.change | {"places": [*result.change["places"], *places]}
             result = dataclasses.replace(result, change=change)
@@ -244,8 +247,6 @@ class Updater:
         if change is Change.GONE:
             places = record_places([demolish(earlier)], frame)
             return self.mark(end_building(earlier), change, chance, places, member)
-        if change is Change.NOT_COVERED:
-            return self.mark(earlier, change, chance, [], member)
         if not member.is_same_outline:
             return self.redraw(job, member, earlier, verdict, lost)
         if change is Change.UNCHANGED:

@@ -1,8 +1,9 @@
 """Parts of an earlier roof that the new survey does not show.
 
-Neither the roof nor bare ground has points there: something hid the part, it lies outside the
-strips, or its points have none of the roof's classes. A hole between points that chance makes is
-smaller than the distance from which on a place counts.
+Neither the roof nor bare ground has points there: something hid the part, or it lies outside the
+strips. Where points of other classes lie there, such as leaves or rubble, it is unclear whether the
+roof stands. A hole between points that chance makes is smaller than the distance from which on a
+place counts.
 """
 
 from __future__ import annotations
@@ -12,10 +13,13 @@ import math
 import numpy as np
 import shapely
 
+from ..city.work.other_classes import CELL_M2, select_inside
+from ..city.work.solve import Surroundings
 from ..geometry.grid import KEY_OF_CELL
 from ..model import Roof
-from ..status import ChangeKind
+from ..status import Change, ChangeKind
 from .cells import CellComparison, shrink_outline
+from .judge import ChangeVerdict
 from .kinds import Difference, draw_cells
 from .lineage import PART_GRID_M
 
@@ -25,22 +29,39 @@ of a point from its seventh neighbour: a circle of this radius would hold 28 poi
 its quarter at a corner seven. Lines of points that lie far apart make larger cells, of which the
 side counts."""
 
+HIDDEN_SHARE = 0.3
+"""Share of an unseen place's square metres with points of other classes, from which on the survey
+covers it: of one point in two square metres 0.39 hold any."""
+
 LEAST_UNSEEN_M2 = 8.0
 """Area (m2) without points from which on a part is reported, as of bare ground in a first survey.
 In sparse surveys it is half of that circle."""
 
 
-def find_unseen(roof: Roof, comparison: CellComparison) -> list[Difference]:
+def find_unseen(roof: Roof, verdict: ChangeVerdict, new: Surroundings) -> list[Difference]:
     """Return the place of the earlier `roof` that the new survey does not show.
 
-    Small places do not count. Without old points all of the earlier roof could be seen.
+    Small places do not count. Without old points all of the earlier roof could be seen. Where `new`
+    points of other classes lie all over the place, or over a roof that is hardly covered, the place
+    is unclear.
     """
+    place = draw_unseen(roof, verdict.comparison)
+    for area in (place, roof.outline if verdict.change is Change.NOT_COVERED else None):
+        if area is not None and is_hidden(shapely.transform(area, roof.frame.to_world), new):
+            return [Difference(ChangeKind.UNCLEAR, math.nan, math.nan, area.area, area)]
+    if place is None:
+        return []
+    return [Difference(ChangeKind.UNSEEN, math.nan, math.nan, place.area, place)]
+
+
+def draw_unseen(roof: Roof, comparison: CellComparison) -> shapely.Geometry | None:
+    """Return the place of a roof that no points show, None for a small one."""
     c, xy = comparison, comparison.points[:, :2]
     cells, is_known = list_cells(roof, c)
     if not len(xy):
-        return [Difference(ChangeKind.UNSEEN, math.nan, math.nan, roof.outline.area, roof.outline)]
+        return roof.outline
     if is_known.sum() * PART_GRID_M**2 < LEAST_UNSEEN_M2:
-        return []
+        return None
     from scipy.spatial import KDTree
 
     tree, places = KDTree(xy), (cells + 0.5) * PART_GRID_M
@@ -48,12 +69,18 @@ def find_unseen(roof: Roof, comparison: CellComparison) -> list[Difference]:
     reach = max(REACH_M, OVER_NEIGHBOURS * spacing, c.cell_m)
     core = places[is_known & (tree.query(places)[0] > reach)]
     if not len(core):
-        return []
+        return None
     members = cells[KDTree(core).query(places)[0] <= reach]
     place = shapely.intersection(draw_cells(members, PART_GRID_M), roof.outline)
-    if place.area < max(LEAST_UNSEEN_M2, math.pi * reach**2 / 2):
-        return []
-    return [Difference(ChangeKind.UNSEEN, math.nan, math.nan, place.area, place)]
+    return place if place.area >= max(LEAST_UNSEEN_M2, math.pi * reach**2 / 2) else None
+
+
+def is_hidden(place: shapely.Geometry, new: Surroundings) -> bool:
+    """Return whether points of other classes lie all over a `place` of the world."""
+    west, south, east, north = np.array(place.bounds)
+    box = np.array([math.floor(west), math.floor(south), math.ceil(east), math.ceil(north)])
+    n_cells = select_inside(place, new.low.inside(box)).sum()
+    return bool(n_cells * CELL_M2 >= HIDDEN_SHARE * place.area)
 
 
 def list_cells(roof: Roof, comparison: CellComparison) -> tuple[np.ndarray, np.ndarray]:
