@@ -177,7 +177,18 @@ def test_a_use_that_no_building_has_is_refused(tmp_path):
 
 
 def test_uses_of_which_some_are_known_get_no_warning(tmp_path, recwarn):
-    houses = [place_house("a", 0, 0, use="31001_1000"), place_house("b", 30, 0, use="Wohnhaus")]
+    houses = [place_house("a", 0, 0, use="31001_2000"), place_house("b", 30, 0, use="Wohnhaus")]
     folder = write_street(tmp_path, houses)
     enrich_run(folder, settings=EnrichSettings(use_attribute="use"), processes=1)
     assert not recwarn.list
+
+
+@pytest.mark.parametrize("use", ["31001_1010", "31001_1120", "1010", 1000, "Wohnhaus"])
+def test_codes_of_dwellings_are_read(use, tmp_path):
+    houses = [place_house("a", 0, 0, use=use), place_house("b", 30, 0, use="31001_2020")]
+    folder = write_street(tmp_path, houses)
+    enrich_run(folder, settings=EnrichSettings(use_attribute="use"), processes=1)
+    lines = (folder / "enriched" / "buildings.city.jsonl").read_text().splitlines()[1:]
+    houses = {f["id"]: f["CityObjects"][f["id"]]["attributes"] for f in map(json.loads, lines)}
+    types = {id: values["hiproof_house_type"] for id, values in houses.items()}
+    assert types == {"a": "detached", "b": None}

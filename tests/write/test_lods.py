@@ -124,8 +124,8 @@ def test_citygml_has_each_level_in_its_property(tmp_path):
 
 def test_eaves_are_where_roofs_end():
     assert roof_figures(gable_house(eave=3.0, ridge=7.0)).h_eave == pytest.approx(3.0, abs=1e-3)
-    # a quantile by length: 16 m of the flat roof's edge, 12 m of the gable's, at 4 m
-    assert roof_figures(terrace().solid).h_eave == pytest.approx(3.0, abs=1e-3)
+    # a quantile by area: 48 m2 of the gable, 32 m2 of the flat roof, whose edges are longer
+    assert roof_figures(terrace().solid).h_eave == pytest.approx(4.0, abs=1e-3)
 
 
 def test_building_parts_have_solids_types_heights_and_parameters(tmp_path):

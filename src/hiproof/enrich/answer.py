@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+import re
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -48,6 +49,8 @@ TABULA = {
 
 # Beginnings of words that name a residential use, in English, Dutch, German and French.
 RESIDENTIAL = ("resid", "dwell", "house", "apartment", "flat", "woon", "wohn", "habit", "logement")
+# Codes of one, in the lists of AdV (31001) and SIG3D.
+RESIDENTIAL_CODE = re.compile(r"31001_1[0-2]\d\d|10\d\d")
 
 
 def is_residential(use: Any) -> bool:
@@ -55,9 +58,13 @@ def is_residential(use: Any) -> bool:
 
     >>> is_residential("Wohngebäude"), is_residential("office"), is_residential(None)
     (True, False, True)
+    >>> is_residential("31001_1010"), is_residential("31001_2020"), is_residential(1000)
+    (True, False, True)
     """
-    words = str(use or "").lower().replace("_", " ").split()
-    return not words or any(word.startswith(RESIDENTIAL) for word in words)
+    text = str(use or "").lower()
+    words = text.replace("_", " ").split()
+    is_word = any(word.startswith(RESIDENTIAL) for word in words)
+    return not words or is_word or bool(RESIDENTIAL_CODE.fullmatch(text.strip()))
 
 
 def name_house_type(town: Town, number: int, floor_area_m2: float, use: Any) -> str | None:

@@ -33,10 +33,10 @@ class RoofFigures:
     A figure is NaN where there is nothing to measure.
 
     `h_50p` and `h_70p` are the levels that 50 and 70 % of the roof's plan area lie below; `h_ridge`
-    the height of the longest level edge from which two faces fall away, `h_eave` that which half of
-    the length of the eaves lies below. `slope_deg` and `azimuth_deg` (clockwise from north, the way
-    water runs) are those of the largest roof face, `face_slope_deg` and `face_azimuth_deg` (faces,)
-    those of every face, `face_area_m2` (faces,) the true area of roof faces, 0 of others.
+    the height of the longest level edge from which two faces fall away, `h_eave` that which the
+    eaves of half of the plan area lie below. `slope_deg` and `azimuth_deg` (clockwise from north,
+    the way water runs) are those of the largest roof face, `face_slope_deg` and `face_azimuth_deg`
+    (faces,) those of every face, `face_area_m2` (faces,) the true area of roof faces, 0 of others.
     """
 
     h_min: float
@@ -96,7 +96,8 @@ def roof_figures(solid: Solid) -> RoofFigures:
     is_roof = np.array([face.kind == ROOF for face in solid.faces])
     slope, azimuth = slopes_and_azimuths(area, is_roof)
     places, ends = shell.corners[corners], corners[:, 1:]
-    edges = roof_edges(places[:, 1:], shell.index[ends], area[shell.face_of[ends[:, 0]]])
+    faces = shell.face_of[ends[:, 0]]
+    edges = roof_edges(places[:, 1:], shell.index[ends], area[faces], faces)
     heights = roof_heights(np.sort(places[:, :, 2], axis=1), plan, float(origin[2]))
     eave = find_eave_height(edges) + float(origin[2])
     size = np.where(is_roof, np.sqrt((area * area).sum(axis=1)), 0.0)
@@ -159,7 +160,8 @@ class RoofEdges(NamedTuple):
     """The roof's directed edges.
 
     Each has the height of its middle (m,), its length in plan, a number that is the same for both
-    directions, whether it is level, and whether the face left of it falls away from it.
+    directions, whether it is level, and whether the face left of it falls away from it. `face` is
+    the number of that, `plan_m2` its area in plan.
     """
 
     height: np.ndarray
@@ -167,14 +169,18 @@ class RoofEdges(NamedTuple):
     number: np.ndarray
     is_level: np.ndarray
     falls_away: np.ndarray
+    face: np.ndarray
+    plan_m2: np.ndarray
 
 
-def roof_edges(edges: np.ndarray, ends: np.ndarray, area: np.ndarray) -> RoofEdges:
+def roof_edges(
+    edges: np.ndarray, ends: np.ndarray, area: np.ndarray, face: np.ndarray
+) -> RoofEdges:
     """Return the roof's edges from `edges` (m, 2, 3), start and end.
 
-    `ends` (m, 2) are their vertex indices, and `area` (m, 3) the vector area of each edge's face. A
-    face lies left of its edges and falls along its vector area's plan direction, so it falls away
-    from an edge when that direction points left.
+    `ends` (m, 2) are their vertex indices, `face` (m,) their faces' numbers and `area` (m, 3) their
+    vector areas. A face lies left of its edges and falls along its vector area's plan direction, so
+    it falls away from an edge when that direction points left.
     """
     start, end = edges[:, 0], edges[:, 1]
     x, y, rise = (end - start).T
@@ -188,6 +194,8 @@ def roof_edges(edges: np.ndarray, ends: np.ndarray, area: np.ndarray) -> RoofEdg
         np.minimum(first, last) * (int(ends.max()) + 1) + np.maximum(first, last),
         np.abs(rise) < LEVEL_RIDGE_M,
         falls & (np.hypot(area[:, 0], area[:, 1]) > STEEP * area[:, 2]),
+        face,
+        area[:, 2],
     )
 
 
@@ -205,10 +213,11 @@ def find_ridge_height(edges: RoofEdges) -> float:
 
 
 def find_eave_height(edges: RoofEdges) -> float:
-    """Return the height below which half of the length of the eaves lies.
+    """Return the height below which the eaves of half of the roof's area lie.
 
     Eaves are level edges of one roof face alone that does not fall away from them; of a roof
-    without one, all its outer edges.
+    without one, all its outer edges. Those of a face share its area by their length: a low annex
+    has long ones, all around.
     """
     ordered = np.sort(edges.number)
     outer = (
@@ -218,11 +227,13 @@ def find_eave_height(edges: RoofEdges) -> float:
     )
     eaves = outer & edges.is_level & ~edges.falls_away
     selection = eaves if eaves.any() else outer
+    length, face = edges.length[selection], edges.face[selection]
+    share = length / np.maximum(np.bincount(face, length)[face], 1e-9)
     # nor does the order hang on it
-    height, length = np.round(edges.height[selection], 4), edges.length[selection]
+    height, weight = np.round(edges.height[selection], 4), share * edges.plan_m2[selection]
     order = np.argsort(height, kind="stable")
     return float(
-        height[order][np.searchsorted(np.cumsum(length[order]), 0.5 * length.sum() - 1e-6)]
+        height[order][np.searchsorted(np.cumsum(weight[order]), 0.5 * weight.sum() - 1e-6)]
     )
 
 
