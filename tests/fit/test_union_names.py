@@ -5,7 +5,10 @@ import math
 import numpy as np
 import pytest
 
+from hiproof.fit.roof import fit_building
 from hiproof.fit.roof.parts import find_visible_planes, regularise
+from hiproof.simulate import ScanSettings, random_compound, scan
+from hiproof.simulate.scene import Defects
 
 SLOPE, EAVE = 0.8, 3.0
 
@@ -56,3 +59,17 @@ def test_where_only_planes_over_walls_show_one_of_the_shapes_own_stays():
     assert np.nanmin(corner @ rows[is_present].T, axis=1) == pytest.approx(
         np.nanmin(corner @ rows.T, axis=1)
     )
+
+
+def test_a_wing_that_ends_in_a_roof_is_a_gable():
+    """It has a plane of that roof as its hidden end, and was called a hip at one end."""
+    right = []
+    for seed in range(6100, 6116):
+        rng = np.random.default_rng(seed)
+        building = random_compound(rng, ("L", "T", "U")[seed % 3])
+        if {part.type for part in building.roof.parts} == {"gable"}:
+            scanned = scan(building, rng, ScanSettings(density=6.0, defects=Defects.none()))
+            points = building.roof.frame.to_local(scanned.points[scanned.source != 2])
+            parts = fit_building(points, building.outline).roof_parts
+            right.append({part.type for part in parts} == {"gable"})
+    assert len(right) > 10 and np.mean(right) >= 0.9

@@ -140,14 +140,14 @@ def read_parts(
     """Name what each volume roofs of an `outline` in the plan's coordinates."""
     (free, covariance), is_anchored = estimate_covariance(roof, site), find_anchored(roof, site)
     inner, outer, parts = make_tables_like(roof), make_tables_like(roof), []
-    for k, polygons, is_cut in list_places(roof, draw_whole_roof(roof, site), outline):
-        axes = find_axes(roof, k)
+    for k, polygons, numbers, is_cut in list_places(roof, draw_whole_roof(roof, site), outline):
+        axes = find_axes(roof, k, numbers)
         anchored = is_anchored[np.abs(roof.sides[k]) - 1]
         sigmas = estimate_side_sigmas(roof, inner, outer, site, k, anchored)
         sides = read_sides(roof, k, axes, anchored, sigmas)
         if is_cut:
             sides = cut_sides(sides, shapely.get_coordinates(polygons), axes, outline)
-        planes = read_planes(free, k, axes, covariance)
+        planes = read_planes(free, k, numbers, axes, covariance)
         local = [shapely.transform(polygon, plan.frame.xy_local) for polygon in polygons]
         local_axes = axes @ plan.frame.rotation
         parts.append(name_planes(planes, sides, local_axes, local, plan.frame, types))

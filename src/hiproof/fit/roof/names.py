@@ -19,23 +19,28 @@ from .tables import N_SIDES, UNKNOWN_COUNT, Tables, read_line
 FACED = 0.9  # Cosine of the angle up to which a plane faces one of four axes.
 
 
-def find_axes(roof: Tables, k: int) -> np.ndarray:
-    """Return the axes (2, 2) of volume k: along the first of its planes, else of its sides."""
-    sloping = np.flatnonzero(roof.slopes[k, : roof.n_planes[k]] >= 0)
-    lines = roof.plane_lines[k, sloping] if len(sloping) else roof.sides[k, 2:]
+def find_axes(roof: Tables, k: int, numbers: list[int]) -> np.ndarray:
+    """Return the axes (2, 2) of volume k with planes `numbers`: along the first, else its sides."""
+    sloping = [p for p in numbers if roof.slopes[k, p] >= 0]
+    lines = roof.plane_lines[k, sloping] if sloping else roof.sides[k, 2:]
     a, b, _ = read_line(roof, lines[0])
     angle = math.remainder(math.atan2(b, a), 0.5 * math.pi)
     c, s = math.cos(angle), math.sin(angle)
     return np.array([[c, s], [-s, c]])
 
 
-def read_planes(roof: Tables, k: int, axes: np.ndarray, covariance: np.ndarray) -> Planes:
-    """Return the planes of volume k in its axes, with the `covariance` (u, u) of its unknowns."""
+def read_planes(
+    roof: Tables, k: int, numbers: list[int], axes: np.ndarray, covariance: np.ndarray
+) -> Planes:
+    """Return planes of volume k, by `numbers`, in its axes.
+
+    `covariance` (u, u) is that of the roof's unknowns.
+    """
     n_unknowns = roof.counts[UNKNOWN_COUNT]
     walls: list[OutlineWall] = []
     rows = np.full((N_SIDES + 1, 3), np.nan)
     design = np.zeros((N_SIDES + 1, 3, n_unknowns))
-    for p in range(roof.n_planes[k]):
+    for p in numbers:
         a, b, c = read_line(roof, roof.plane_lines[k, p])
         u, v = (x if abs(x) > STRAIGHT else 0.0 for x in (axes @ [a, b]).tolist())
         slope = roof.values[roof.slopes[k, p]] if roof.slopes[k, p] >= 0 else 0.0

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import shapely
 
 from ...geometry.rings import intersect, subtract, unite
 from ...primitives.contract import RECTANGLE
 from ..shapes.regions import find_neighbour, list_polygons, widen_gap
-from .draw import RING_CORNERS, Drawing, cut, join_fragments
+from .draw import FRAGMENT_M2, RING_CORNERS, Drawing, cut, join_fragments
 from .tables import FAR_M, N_SIDES, VOLUME_COUNT, Tables
 
 HIGHER_M = 1e-6  # A volume no more than this (m) below another is not below it.
@@ -18,19 +20,30 @@ BELOW_M = 0.2  # Distance (m) by which a part reaches below what hides it.
 LEAST_PLACE_M2 = 1.0  # Area (m2) of the smallest place that is a part by itself.
 
 
-def list_places(
-    roof: Tables, drawing: Drawing, outline: shapely.Polygon
-) -> list[tuple[int, list[shapely.Polygon], bool]]:
-    """List the volumes of a drawn roof, each with the polygons that make one part.
+class Place(NamedTuple):
+    """A volume, or a piece of one, that is a part: its number, polygons and planes.
+
+    `is_cut` says whether it has other ends than its volume.
+    """
+
+    volume: int
+    polygons: list[shapely.Polygon]
+    planes: list[int]
+    is_cut: bool
+
+
+def list_places(roof: Tables, drawing: Drawing, outline: shapely.Polygon) -> list[Place]:
+    """List the places of a drawn roof that are one part each.
 
     A volume is several parts where steps keep the places apart in which it is visible, and inside
     another, as dormers are: a person sees several. What crosses another is one, because it stands
     out of it on both sides. Level volumes at one height that touch are one part, of the largest.
-    The last value says whether a part has other ends than its volume.
     """
     regions = draw_regions(roof, outline)
+    planes = [list(range(count)) for count in roof.n_planes[: len(regions)].tolist()]
     if len(regions) == 1:
-        return [(0, regions[0], len(regions[0]) > 1)]
+        return [Place(0, regions[0], planes[0], len(regions[0]) > 1)]
+    ended = end_at_others(roof, drawing, regions, planes)
     visible: dict[int, shapely.Geometry] = {}
     groups: dict[tuple, dict[int, list[int]]] = {}
     first = join_fragments(roof, drawing)
@@ -54,10 +67,52 @@ def list_places(
             inside = is_inside(visible, owner)
         large = [area for area in (apart if inside else areas) if area.area > LEAST_PLACE_M2]
         if len(large) < 2 or (not inside and crosses(visible, owner, large)):
-            places += [(owner, whole, len(owners) > 1 or len(large) > 1)] if whole else []
+            is_cut = owner in ended or len(owners) > 1 or len(large) > 1
+            places += [Place(owner, whole, planes[owner], is_cut)] if whole else []
         else:
-            places += [(owner, p, True) for p in split_region(whole, large, outline) if p]
+            split = split_region(whole, large, outline)
+            places += [Place(owner, part, planes[owner], True) for part in split if part]
     return places
+
+
+def end_at_others(
+    roof: Tables,
+    drawing: Drawing,
+    regions: list[list[shapely.Polygon]],
+    planes: list[list[int]],
+) -> set[int]:
+    """End volumes where a plane begins that is hidden, or that another volume shows as its own.
+
+    A wing that ends in a roof may have that roof's plane as its end, but is a gable. Changes the
+    `regions` and `planes` of volumes and the owners of fragments, and returns which volumes end so.
+    """
+    ended, owners = set(), drawing.owners[: drawing.count[0]]
+    for k in range(len(regions)):
+        for p in reversed(planes[k]):
+            seen = np.flatnonzero((owners == (k, p)).all(axis=1))
+            is_of_side = abs(roof.plane_lines[k, p]) in np.abs(roof.sides[k])
+            if len(planes[k]) == (1 if len(seen) else 2) or (len(seen) and is_of_side):
+                continue
+            same = np.argwhere(drawing.numbers[: len(regions)] == drawing.numbers[k, p])
+            others = [(j, q) for j, q in same.tolist() if j != k and q in planes[j]]
+            shown = unite([area for j, q in others for area in draw_lowest(roof, j, q, regions[j])])
+            own = draw_lowest(roof, k, p, regions[k])
+            if own and subtract(unite_fragments(drawing, seen.tolist()), shown).area <= FRAGMENT_M2:
+                regions[k] = list_polygons(subtract(unite(regions[k]), unite(own)))
+                planes[k].remove(p)
+                ended.add(k)
+                if len(seen):
+                    owners[seen] = others[0]
+    return ended
+
+
+def draw_lowest(
+    roof: Tables, k: int, p: int, region: list[shapely.Polygon]
+) -> list[shapely.Polygon]:
+    """Return where plane p is the lowest of volume k in its region."""
+    others = np.delete(roof.planes[k, : roof.n_planes[k]], p, axis=0)
+    quad = draw_convex(others - roof.planes[k, p])
+    return list_polygons(intersect(unite(region), quad)) if region else []
 
 
 def draw_visible(drawing: Drawing) -> dict[int, shapely.Geometry]:
@@ -155,12 +210,16 @@ def draw_quad(roof: Tables, k: int, outline: shapely.Polygon) -> shapely.Geometr
     """Return the part of an outline inside the sides of volume k."""
     if is_endless(roof, k):
         return outline
-    rings = np.empty((2, RING_CORNERS, 2))
+    return intersect(draw_convex(roof.half_planes[k]), outline)
+
+
+def draw_convex(halves: np.ndarray) -> shapely.Polygon:
+    """Return the polygon inside all half planes (h, 3), but no further out than FAR_M."""
+    rings, size = np.empty((2, RING_CORNERS, 2)), N_SIDES
     rings[0, :N_SIDES] = 2.0 * FAR_M * np.array(RECTANGLE)
-    size = N_SIDES
-    for s in range(N_SIDES):
-        size = cut(rings[0], size, *roof.half_planes[k, s].tolist(), rings[1])
-    return intersect(shapely.Polygon(rings[0, :size]), outline) if size else shapely.Polygon()
+    for half in halves.tolist():
+        size = cut(rings[0], size, *half, rings[1]) if size else 0
+    return shapely.Polygon(rings[0, :size])
 
 
 def is_below(roof: Tables, j: int, k: int, quad: shapely.Geometry) -> bool:
