@@ -338,6 +338,22 @@ def test_meshes_keep_their_identifiers_when_another_building_leaves(run, outputs
     assert not set().union(*ids.values()) & set().union(*read_mesh_ids(tmp_path / "b.3dm").values())
 
 
+def test_drawings_of_a_town_have_one_fingerprint_and_those_of_another_have_not(
+    run, outputs, tmp_path
+):
+    lines = read_lines(run)
+    name = next(line["id"] for line in lines[1:] if line.get("parts"))
+    rest = write_town(tmp_path / "a", [line for line in lines if line.get("id") != name])
+    far = write_town(tmp_path / "b", lines, east=25_000.0)
+    for source, file in ((rest, "a.dxf"), (far, "b.dxf")):
+        convert(source, tmp_path / file)
+    first, second, other = (
+        open_sound_drawing(path).header["$FINGERPRINTGUID"]
+        for path in (outputs("dxf"), tmp_path / "a.dxf", tmp_path / "b.dxf")
+    )
+    assert first == second != other
+
+
 @pytest.mark.parametrize("number", range(3))
 def test_global_ids_stay_when_a_building_crosses_a_kilometre_line(number, run, outputs, tmp_path):
     first = [line for line in read_lines(run)[1:] if line.get("parts")][number]

@@ -21,6 +21,7 @@ import shapely
 from ...extras import import_extra
 from ...model import CEILING, GROUND, ROOF, WALL
 from ..colours import GROUND_COLOUR, ROOF_COLOURS, WALL_COLOUR
+from ..naming import PlacedNames, make_uuid
 from .triangles import faces_triangles
 from .viewed import ViewedModel
 
@@ -52,6 +53,9 @@ def write_models(path: Path, buildings: Iterable[ViewedModel], crs: str | None =
     document, unit_m = start_drawing(import_extra("ezdxf", "dxf", "DXF"), crs)
     space, count = document.modelspace(), 0
     for model in buildings:
+        if not count:  # names of drawings are kept by other programs
+            town = PlacedNames(crs).name_square(model.corner)
+            document.header["$FINGERPRINTGUID"] = f"{{{make_uuid('drawing', town)}}}".upper()
         draw_building(space, model, unit_m)
         count += 1
     with atomic_file(path) as file:
