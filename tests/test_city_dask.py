@@ -14,7 +14,7 @@ from hiproof.errors import InputError, OutputError
 from hiproof.update import run as update_run
 from hiproof.update.request import UpdateRequest
 from hiproof.update.run import update_area
-from run_records import records
+from run_records import by_id, records
 from tiny_town import make_town, write_cloud
 
 dask = pytest.importorskip("dask", reason="needs dask[distributed], the extra `city`")
@@ -46,17 +46,6 @@ def small_tiles(monkeypatch):
     monkeypatch.setattr("hiproof.city.plan.prepare.MOST_BUILDINGS_A_TILE", 1)
 
 
-def test_a_cluster_whose_worker_is_killed_changes_no_byte(
-    town_files, reference_run, cluster, tmp_path, monkeypatch
-):
-    monkeypatch.setattr(city_run, "solve_tile", planted.solve_killed_once)
-    reconstruct_area(
-        Request((town_files[0],), tmp_path, town_files[1], scheduler=cluster.scheduler_address)
-    )
-    assert (tmp_path / ".hiproof" / "killed").exists()
-    assert records(tmp_path) == records(reference_run)
-
-
 def test_an_update_on_a_cluster_whose_worker_is_killed_changes_no_byte(
     town_files, cluster, tmp_path, monkeypatch
 ):
@@ -80,7 +69,7 @@ def test_an_update_on_a_cluster_whose_worker_is_killed_changes_no_byte(
 
 
 def test_a_building_that_kills_dask_workers_is_left_out_alone(
-    town_files, cluster, tmp_path, monkeypatch
+    town_files, reference_run, cluster, tmp_path, monkeypatch
 ):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_deadly)
     # one death is enough to blame a task here: each costs the start of a worker
@@ -92,6 +81,8 @@ def test_a_building_that_kills_dask_workers_is_left_out_alone(
     )
     assert summary.buildings == 4
     assert [id for id, _ in summary.failures] == [planted.DEADLY]
+    rows, expected = by_id(tmp_path), by_id(reference_run)
+    assert {**rows, planted.DEADLY: None} == {**expected, planted.DEADLY: None}
 
 
 def test_an_address_without_a_scheduler_gets_one_sentence(town_files, tmp_path, monkeypatch):

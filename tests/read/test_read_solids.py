@@ -220,7 +220,7 @@ def test_the_hague_reads_whole_and_most_of_it_is_valid():
     assert len(solids) == 1990
     codes = [
         tuple(sorted({f.code for f in check_solid(solid, planarity_m=0.01)}))
-        for solid in solids.values()
+        for solid in list(solids.values())[::4]
     ]
-    assert codes.count(()) > 1800
+    assert codes.count(()) > 450
     assert set(codes) <= {(), (102,), (104,), (203,)}

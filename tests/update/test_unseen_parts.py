@@ -75,7 +75,7 @@ def raise_unclassified(town, inside):
     ("change", "answer"),
     [(hide, ("not_covered", "unseen")), (raise_unclassified, ("uncertain", "unclear"))],
 )
-@pytest.mark.parametrize(("density", "seed"), [(2.0, 1), (4.0, 2), (8.0, 3), (16.0, 4)])
+@pytest.mark.parametrize(("density", "seed"), [(2.0, 1), (8.0, 3)])
 def test_a_wing_without_points_of_the_roof_is_not_called_unchanged(
     run, change, answer, density, seed, tmp_path
 ):
@@ -143,9 +143,8 @@ def test_a_survey_that_covers_no_building_is_told(run, tmp_path):
     assert {take_class(row) for row in after.values()} == {"not_covered"}
 
 
-@pytest.mark.parametrize("seed", [7, 8])
-def test_a_changed_house_also_names_its_unseen_wing(run, seed, tmp_path):
-    town, wings = make_winged(6.0, seed)
+def test_a_changed_house_also_names_its_unseen_wing(run, tmp_path):
+    town, wings = make_winged(6.0, 7)
     main = town.footprints["house-1"].difference(wings["house-1"])
     up = shapely.intersects_xy(main, *town.xyz[:, :2].T) & (town.classification == 6)
     town.xyz[up, 2] += 2.5
@@ -172,10 +171,10 @@ def find(roof, old, new):
 
 
 @pytest.mark.parametrize("has_old", [True, False])
-@pytest.mark.parametrize("density", [0.5, 1.0, 3.0, 10.0])
-def test_chance_hides_no_part_of_300_roofs(density, has_old):
+@pytest.mark.parametrize("density", [0.5, 3.0])
+def test_chance_hides_no_part_of_a_hundred_roofs(density, has_old):
     rng, areas = np.random.default_rng([int(2 * density), has_old]), []
-    for _ in range(300):
+    for _ in range(100):
         roof = random_building(rng).roof
         old = scan(rng, roof, 6.0) if has_old else None
         areas.append(find(roof, old, scan(rng, roof, density)) or 0.0)
@@ -183,10 +182,10 @@ def test_chance_hides_no_part_of_300_roofs(density, has_old):
 
 
 @pytest.mark.parametrize("has_old", [True, False])
-@pytest.mark.parametrize("density", [1.0, 3.0, 10.0])
+@pytest.mark.parametrize("density", [1.0, 10.0])
 def test_a_hidden_end_of_a_roof_is_measured(density, has_old):
     rng, ratios = np.random.default_rng([int(density), 3]), []
-    while len(ratios) < 60:
+    while len(ratios) < 20:
         roof = random_building(rng).roof
         x0, y0, x1, y1 = roof.outline.bounds
         cut = x1 - rng.uniform(0.2, 0.45) * (x1 - x0)
@@ -197,7 +196,7 @@ def test_a_hidden_end_of_a_roof_is_measured(density, has_old):
         area = find(roof, old if has_old else None, new[new[:, 0] < cut])
         if area is not None:  # else little of it is covered at all
             ratios.append(area / hidden.area)
-    assert sum(ratio > 0.5 for ratio in ratios) >= 57, sorted(ratios)[:6]
+    assert sum(ratio > 0.5 for ratio in ratios) >= 19, sorted(ratios)[:6]
     assert max(ratios) < 1.4
 
 
