@@ -1,23 +1,20 @@
-"""Exact distances from points to bounded planar polygons. Compiled.
+"""Exact distances from points to bounded planar polygons, on which all residual figures build.
 
-All residual figures build on them.
-
-The distance of a point to a polygon is the distance to its plane where the foot of the
-perpendicular lies inside the polygon, else the distance to the nearest edge. The plane distance
-bounds both from below, so a polygon whose plane is farther than the best distance so far is
-skipped.
+The distance of a point to a polygon follows from that to its plane and, in the plane, that of the
+foot of the perpendicular to the polygon. The plane distance bounds it from below, so points are
+passed over whose plane distance is no less than the best so far.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
+import shapely
 
-from ..compiled import compiled
 from ..errors import InputError
-from ..geometry.flat_shell import FlatShell
-from ..geometry.point_in_polygon import flips
+from ..geometry.point_in_polygon import find_inside
+from ..geometry.rings import ring_normal
 from ..model import as_xyz
 
 # (m, 3) vertices without the closing one; a polygon is a ring or a sequence of rings, the outer
@@ -40,8 +37,17 @@ def point_surface_distances(
     >>> point_surface_distances(np.array([[1.0, 1, 3], [5, 1, 4]]), [square]).tolist()
     [3.0, 5.0]
     """
-    points = np.ascontiguousarray(as_xyz(points))
-    return measure_distances(points, *list_faces(polygons))
+    points = as_xyz(points)
+    nearest = np.full(len(points), np.inf)
+    for rings, normal in list_faces(polygons):
+        height = (points - rings[0][0]) @ normal
+        near = np.flatnonzero(np.abs(height) < nearest)
+        feet = points[near] - height[near, None] * normal
+        inside = find_over(rings, int(np.abs(normal).argmax()), feet)
+        nearest[near[inside]] = np.abs(height[near[inside]])
+        beside = np.delete(near, inside)
+        nearest[beside] = np.minimum(nearest[beside], measure_edges(points[beside], rings))
+    return nearest
 
 
 def vertical_distances(points: np.ndarray, polygons: Sequence[Ring | Sequence[Ring]]) -> np.ndarray:
@@ -50,95 +56,53 @@ def vertical_distances(points: np.ndarray, polygons: Sequence[Ring | Sequence[Ri
     Polygons count that lie over or under the point; it is inf where none does.
 
     >>> square = np.array([[0.0, 0, 0], [2, 0, 2], [2, 2, 2], [0, 2, 0]])
-    >>> vertical_distances(np.array([[1.0, 1, 3], [5, 1, 4]]), [square]).tolist()
+    >>> vertical_distances(np.array([[1.0, 1, 3], [5, 1, 4]]), [square]).round(6).tolist()
     [2.0, inf]
     """
-    points = np.ascontiguousarray(as_xyz(points))
-    return measure_gaps(points, *list_faces(polygons))
+    points = as_xyz(points)
+    nearest = np.full(len(points), np.inf)
+    for rings, normal in list_faces(polygons):
+        if abs(normal[2]) < UPRIGHT:
+            continue
+        over = find_over(rings, 2, points)
+        gap = np.abs((points[over] - rings[0][0]) @ normal / normal[2])
+        nearest[over] = np.minimum(nearest[over], gap)
+    return nearest
 
 
-def list_faces(polygons: Sequence[Ring | Sequence[Ring]]) -> tuple[np.ndarray, ...]:
-    """Return the edges of all polygons, from and to (m, 3), their starts, and unit normals (f, 3).
+def find_over(rings: list[Ring], axis: int, points: np.ndarray) -> np.ndarray:
+    """Return which of `points` (n, 3) the rings hold, seen along an axis."""
+    outer, *holes = (np.delete(ring, axis, axis=1) for ring in rings)
+    return np.flatnonzero(
+        find_inside(shapely.Polygon(outer, holes), *np.delete(points, axis, axis=1).T)
+    )
 
-    A normal is zero without area. Raises InputError for arrays of another shape.
+
+def measure_edges(points: np.ndarray, rings: list[Ring]) -> np.ndarray:
+    """Return the distances (n,) of points (n, 3) to the nearest edge of the rings."""
+    start = np.concatenate(rings)
+    along = np.concatenate([np.roll(ring, -1, axis=0) for ring in rings]) - start
+    length2 = np.maximum((along**2).sum(axis=1), np.finfo(float).tiny)
+    off = points[:, None] - start
+    share = np.clip(np.einsum("nmk,mk->nm", off, along) / length2, 0.0, 1.0)
+    return np.linalg.norm(off - share[:, :, None] * along, axis=2).min(axis=1)
+
+
+def list_faces(
+    polygons: Sequence[Ring | Sequence[Ring]],
+) -> Iterator[tuple[list[Ring], np.ndarray]]:
+    """Yield the rings of each polygon and its unit normal (3,), zero without area.
+
+    Raises InputError for arrays of another shape.
     """
-    rings, counts = [], [0]
     for polygon in polygons:
         single = isinstance(polygon, np.ndarray) and polygon.ndim == 2
-        rings += [np.asarray(ring, float) for ring in ((polygon,) if single else polygon)]
-        counts.append(len(rings))
-    for ring in rings:
-        if ring.ndim != 2 or ring.shape[1] != 3 or len(ring) < 3:
-            raise InputError(
-                f"expected rings of shape (m, 3) with at least 3 vertices, got {ring.shape}"
-            )
-    vertices = np.concatenate([np.zeros((0, 3)), *rings])
-    ring_start = np.cumsum([0, *map(len, rings)])
-    shell = FlatShell(vertices, np.arange(len(vertices)), ring_start, np.array(counts))
-    normals = shell.areas[shell.face_start[:-1]]
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
-    is_flat = length >= LEAST_AREA_M2
-    normals = np.where(is_flat, normals / np.where(is_flat, length, 1.0), 0.0)
-    return vertices, vertices[shell.after], ring_start[shell.face_start], normals
-
-
-@compiled
-def measure_distances(points, starts, ends, first, normals):
-    """Return the distance (n,) of points (n, 3) to the nearest face, those of `list_faces`."""
-    nearest = np.full(len(points), np.inf)
-    for f in range(len(normals)):
-        a, b, c = normals[f]
-        origin = starts[first[f]]
-        for i in range(len(points)):
-            x, y, z = points[i]
-            height = a * (x - origin[0]) + b * (y - origin[1]) + c * (z - origin[2])
-            if abs(height) >= nearest[i]:
-                continue
-            foot = (x - height * a, y - height * b, z - height * c)
-            if holds(foot, starts, ends, first, f, np.argmax(np.abs(normals[f]))):
-                nearest[i] = abs(height)
-                continue
-            for k in range(first[f], first[f + 1]):
-                nearest[i] = min(nearest[i], measure_edge(points[i], starts[k], ends[k]))
-    return nearest
-
-
-@compiled
-def measure_gaps(points, starts, ends, first, normals):
-    """Return the least |dz| (n,) of points (n, 3) to faces over or under them."""
-    nearest = np.full(len(points), np.inf)
-    for f in range(len(normals)):
-        a, b, c = normals[f]
-        origin = starts[first[f]]
-        if abs(c) < UPRIGHT:
-            continue
-        for i in range(len(points)):
-            x, y, z = points[i]
-            gap = abs((a * (x - origin[0]) + b * (y - origin[1])) / c + z - origin[2])
-            if gap < nearest[i] and holds((x, y, z), starts, ends, first, f, 2):
-                nearest[i] = gap
-    return nearest
-
-
-@compiled
-def holds(place, starts, ends, first, f, axis):
-    """Return whether face f holds a place, seen along an axis. It has an area there."""
-    u, v = (axis + 1) % 3, (axis + 2) % 3
-    inside = False
-    for k in range(first[f], first[f + 1]):
-        inside ^= flips(starts[k, u], starts[k, v], ends[k, u], ends[k, v], place[u], place[v])
-    return inside
-
-
-@compiled
-def measure_edge(point, start, end):
-    """Return the distance of a point (3,) to the edge between two."""
-    dot, length2 = 0.0, 0.0
-    for q in range(3):
-        dot += (point[q] - start[q]) * (end[q] - start[q])
-        length2 += (end[q] - start[q]) ** 2
-    share = min(max(dot / length2, 0.0), 1.0) if length2 > 0.0 else 0.0
-    distance2 = 0.0
-    for q in range(3):
-        distance2 += (point[q] - start[q] - share * (end[q] - start[q])) ** 2
-    return np.sqrt(distance2)
+        rings = [np.asarray(ring, float) for ring in ((polygon,) if single else polygon)]
+        for ring in rings:
+            if ring.ndim != 2 or ring.shape[1] != 3 or len(ring) < 3:
+                raise InputError(
+                    f"expected rings of shape (m, 3) with at least 3 vertices, got {ring.shape}"
+                )
+        normal = ring_normal(rings[0])
+        length = np.linalg.norm(normal)
+        yield rings, normal / length if length >= LEAST_AREA_M2 else np.zeros(3)
