@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import shapely
 
+from .flat_shell import FlatShell
+
 # of coordinates (m) where polygons are overlaid: on a grid no overlay fails, nor loses a polygon
 # whose sides all but lie on a neighbour's, as GEOS 3.14 does without one
 OVERLAY_GRID_M = 1e-6
@@ -125,20 +127,11 @@ def list_between(
 
 
 def ring_normal(ring: np.ndarray) -> np.ndarray:
-    """Return the vector area (3,) of a ring (m, 3), first vertex once, by Newell's method."""
+    """Return the vector area (3,) of a ring (m, 3), first vertex once."""
     return ring_normals([ring])[0]
 
 
 def ring_normals(rings: Sequence[np.ndarray]) -> np.ndarray:
     """Return the vector areas (n, 3) of n rings, each as from `ring_normal`."""
-    sizes = np.array([len(ring) for ring in rings])
-    first = np.cumsum(sizes) - sizes
-    following = np.arange(1, sizes.sum() + 1)
-    following[first + sizes - 1] = first
-    vertices = np.concatenate(rings)
-    centre = np.add.reduceat(vertices, first) / sizes[:, None]
-    x, y, z = (vertices - np.repeat(centre, sizes, axis=0)).T
-    u, v, w = x[following], y[following], z[following]
-    return (
-        np.add.reduceat(np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=1), first) / 2
-    )
+    vertices, start = np.concatenate(rings), np.cumsum([0, *map(len, rings)])
+    return FlatShell(vertices, np.arange(len(vertices)), start, np.arange(len(start))).areas
