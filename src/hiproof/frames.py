@@ -9,6 +9,7 @@ into the roof's own axes.
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 Box = tuple[float, float, float, float]  # xmin, ymin, xmax, ymax
 
@@ -35,19 +36,19 @@ class Units:
     def are_metres(self) -> bool:
         return self.plan == self.height == 1.0
 
-    def to_metres(self, coordinates: np.ndarray) -> np.ndarray:
-        """Convert a file's coordinates (n, 2) or (n, 3) to world metres."""
+    def to_metres(self, coordinates: ArrayLike) -> np.ndarray:
+        """Convert a file's coordinates (n, 2) or (n, 3), or boxes (n, 4), to world metres."""
         coordinates = np.asarray(coordinates, float)
-        return coordinates * self.factors[: coordinates.shape[-1]]
+        return coordinates * self.factors(coordinates.shape[-1])
 
     def from_metres(self, world: np.ndarray) -> np.ndarray:
-        """Convert world metres (n, 2) or (n, 3) to a file's coordinates."""
+        """Convert world metres (n, 2), (n, 3) or (n, 4), boxes, to a file's coordinates."""
         world = np.asarray(world, float)
-        return world / self.factors[: world.shape[-1]]
+        return world / self.factors(world.shape[-1])
 
-    @property
-    def factors(self) -> np.ndarray:
-        return np.array([self.plan, self.plan, self.height])
+    def factors(self, columns: int) -> np.ndarray:
+        """Return what one unit is in metres, by column: places in space have three."""
+        return np.array([self.plan, self.plan, self.height] if columns == 3 else [self.plan])
 
     def __str__(self) -> str:
         return (

@@ -73,7 +73,7 @@ class Bonds:
         return Bonds(*(getattr(self, f.name).take(number, axis=0) for f in fields(self)))
 
     def inside(self, area: shapely.Geometry) -> Bonds:
-        return self.among(shapely.intersects_xy(area, *self.middle.T))
+        return self.among(shapely.intersects_xy(area, self.middle))
 
     def across(self, cut: Cut) -> np.ndarray:
         """Return how far (b, 2) the ends lie before the line of a cut."""
@@ -211,12 +211,12 @@ class Roofs(NamedTuple):
 def roof_m2(area: shapely.Geometry, roofs: Roofs) -> float:
     """Return how much of `area` (m2) lies under roofs, in plan."""
     shapely.prepare(area)
-    return float(roofs.m2[shapely.intersects_xy(area, *roofs.xy.T)].sum())
+    return float(roofs.m2[shapely.intersects_xy(area, roofs.xy)].sum())
 
 
 def depth_m(side: shapely.Geometry, cut: Cut, roofs: Roofs) -> float:
     """Return twice how far (m) half of the roof on a `side` of the cut lies away from it."""
-    inside = shapely.intersects_xy(side, *roofs.xy.T)
+    inside = shapely.intersects_xy(side, roofs.xy)
     return 2.0 * float(np.median(np.abs(roofs.xy[inside] @ cut.normal - cut.offset)))
 
 
@@ -257,7 +257,7 @@ def find_bonds(surfaces: Surfaces) -> Bonds:
 def find_directions(area: shapely.Geometry, roofs: Roofs) -> np.ndarray:
     """Return the azimuths (d,) of cuts: along and across slopes and the block's border."""
     shapely.prepare(area)
-    normal = roofs.normal[shapely.intersects_xy(area, *roofs.xy.T)]
+    normal = roofs.normal[shapely.intersects_xy(area, roofs.xy)]
     rings = [
         np.diff(shapely.get_coordinates(p.exterior), axis=0)
         for p in shapely.get_parts(area.simplify(STRAIGHT_M))

@@ -64,7 +64,7 @@ class Part:
         """Return the height (n,) at `xy_local` (n, 2) in the roof's frame, -inf beside the part."""
         z = np.full(len(xy_local), -np.inf)
         for piece in self.pieces:
-            inside = shapely.intersects_xy(piece.outline, xy_local[:, 0], xy_local[:, 1])
+            inside = shapely.intersects_xy(piece.outline, xy_local[:, :2])
             if inside.any():
                 z[inside] = np.maximum(z[inside], piece.height_at(xy_local[inside]))
         return z

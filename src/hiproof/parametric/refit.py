@@ -73,7 +73,7 @@ def select_inside(roof: Roof, points: np.ndarray) -> np.ndarray:
     """Return the finite world `points` inside the outline (n, 3), about the roof's origin."""
     local = roof.frame.to_local(as_xyz(points))
     local = local[np.isfinite(local).all(axis=1)]
-    return local[shapely.intersects_xy(roof.outline, local[:, 0], local[:, 1])]
+    return local[shapely.intersects_xy(roof.outline, local[:, :2])]
 
 
 def refit_parts(
@@ -89,7 +89,7 @@ def refit_parts(
     if not unknowns.names:
         return parts
     inner = shapely.buffer(roof.outline, -FACADE_M)
-    selection = points[shapely.intersects_xy(inner, points[:, 0], points[:, 1])]
+    selection = points[shapely.intersects_xy(inner, points[:, :2])]
     values, sigma = fit_unknowns(
         roof.parts, selection if len(selection) >= ENOUGH else points, unknowns
     )
@@ -176,10 +176,7 @@ class Heights:
         ]
         self.outlines = [part.outlines for part in parts]
         self.inside = [
-            [
-                np.flatnonzero(shapely.intersects_xy(outline, points[:, 0], points[:, 1]))
-                for outline in outlines
-            ]
+            [np.flatnonzero(shapely.intersects_xy(outline, points[:, :2])) for outline in outlines]
             for outlines in self.outlines
         ]
 

@@ -144,7 +144,7 @@ def scan_scene(
     if rng.random() < defects.missing_strip:
         beams[0] = without_strip(rng, beams[0], swaths[0].heading, centre, reach)
     cloud = returns(scene, join_beams(beams), rng, settings)
-    cloud = cloud.select(shapely.contains_xy(area, cloud.points[:, 0], cloud.points[:, 1]))
+    cloud = cloud.select(shapely.contains_xy(area, cloud.points[:, :2]))
     if rng.random() < defects.partial and len(cloud):
         cloud = without_corner(rng, cloud, centre, reach)
     if defects.outliers > 0 and len(cloud):
@@ -259,7 +259,7 @@ def uniform_points(
     x_low, y_low, x_high, y_high = outline.bounds
     count = rng.poisson(density * (x_high - x_low) * (y_high - y_low))
     xy = rng.uniform((x_low, y_low), (x_high, y_high), (count, 2))
-    xy = xy[shapely.contains_xy(outline, xy[:, 0], xy[:, 1])]
+    xy = xy[shapely.contains_xy(outline, xy[:, :2])]
     band = rng.choice(3, size=len(xy), p=(0.90, 0.09, 0.01))
     error = (band + rng.random(len(xy))) * noise * rng.choice((-1.0, 1.0), len(xy))
     return np.column_stack([xy, building.roof.height_at(xy) + error]) + building.roof.frame.origin

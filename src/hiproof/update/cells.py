@@ -219,7 +219,7 @@ def select_inner(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the points (m, 3) inside `inner`, and their heights (m,) over the roof."""
     shapely.prepare(inner)
-    points = points[shapely.intersects_xy(inner, points[:, 0], points[:, 1])]
+    points = points[shapely.intersects_xy(inner, points[:, :2])]
     residuals = measure_residuals(roof, points)
     known = np.isfinite(residuals)
     return points[known], residuals[known]

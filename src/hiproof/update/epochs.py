@@ -135,7 +135,7 @@ def select_points(surroundings: Surroundings, job: Job) -> np.ndarray:
     if by_class is not None:
         low = fill_cells(find_low_cells(by_class, np.concatenate([roof.points, bare])))
         bare = np.concatenate([find_bare_cells(dataclasses.replace(by_class, ground=bare)), low])
-    by_shape = roof.ground[shapely.intersects_xy(job.area, *roof.ground[:, :2].T)]
+    by_shape = roof.ground[shapely.intersects_xy(job.area, roof.ground[:, :2])]
     return np.concatenate([roof.points, by_shape, bare])
 
 
@@ -155,7 +155,7 @@ def select_roof(surroundings: Surroundings, job: Job) -> FoundRoof:
         return FoundRoof(without_repeats(surroundings.roof.take(inside, axis=0)))
     found = surroundings.select_roof_points(job)
     points = without_repeats(found.points)
-    inside = shapely.intersects_xy(job.area, points[:, 0], points[:, 1])
+    inside = shapely.intersects_xy(job.area, points[:, :2])
     return dataclasses.replace(found, points=points[inside])
 
 
@@ -165,7 +165,7 @@ def find_ground(surroundings: Surroundings, job: Job) -> np.ndarray:
     points = surroundings.ground.inside(box)
     if not len(points):
         points = BareAround(lambda: surroundings.low, box).bare.cells.inside(box)
-    return points[~shapely.intersects_xy(job.area, points[:, 0], points[:, 1])]
+    return points[~shapely.intersects_xy(job.area, points[:, :2])]
 
 
 def compare_ground(ground: np.ndarray, new: Surroundings, job: Job) -> np.ndarray:

@@ -203,7 +203,7 @@ def make_members(
         return tuple(kept)
     footprints = read_requested_footprints(request, frame, where=None, bbox=None)
     footprints = leave_out_copies(footprints, request.footprints)
-    bounds = frame.units.to_metres(plan_bounds(headers).reshape(-1, 2)).reshape(-1, 4)
+    bounds = frame.units.to_metres(plan_bounds(headers))
     check_overlap(footprints, bounds.tolist(), frame.footprints, frame.cloud, frame.units)
     old = [member.outline for member in kept]
     registration = register_footprints(

@@ -167,7 +167,7 @@ class LostParts:
     def measure_under(self, building: Building) -> float:
         """Return the lost area (m2) that a model covers, 0 where it covers little of it."""
         outline = move_to_frame(building.roof, self.earlier).outline
-        share = float(shapely.intersects_xy(outline, *self.places.T).mean())
+        share = float(shapely.intersects_xy(outline, self.places).mean())
         return share * self.area_m2 if share > LEFT_SHARE else 0.0
 
     def make_smaller_job(self, job: Job, shift: tuple[float, float]) -> Job | None:

@@ -50,7 +50,7 @@ def make_update_plan(request: UpdateRequest, earlier: EarlierRun, state: Path) -
     members = make_members(request, earlier, frame, headers, settings)
     jobs = tuple(member.make_job(index) for index, member in enumerate(members))
     save_members(state, members)
-    refuse_elsewhere(jobs, frame.units.to_metres(plan_bounds(headers).reshape(-1, 2)), request)
+    refuse_elsewhere(jobs, frame.units.to_metres(plan_bounds(headers)), request)
     if not request.footprints:  # earlier outlines lie on their roofs
         settings = settings.replace({"reconstruct": {"align": "off"}})
     offset = earlier.head.offset
@@ -95,21 +95,21 @@ def refuse_other_crs(frame: Any, earlier: EarlierRun, request: UpdateRequest) ->
         )
 
 
-def refuse_elsewhere(jobs: tuple[Job, ...], corners: np.ndarray, request: UpdateRequest) -> None:
+def refuse_elsewhere(jobs: tuple[Job, ...], clouds: np.ndarray, request: UpdateRequest) -> None:
     """Raise InputError where the new clouds meet none of the buildings.
 
-    `corners` (2 n, 2) are those of the clouds in metres, two a cloud.
+    `clouds` (n, 4) are the boxes of the clouds in metres.
     """
     areas = [job.area for job in jobs if not job.area.is_empty]
     if not areas:
         raise InputError(
             f"expected buildings with outlines in {request.run}, got none; name another run"
         )
-    boxes = shapely.box(*corners.reshape(-1, 4).T)
+    boxes = shapely.box(*clouds.T)
     if not len(boxes) or len(shapely.STRtree(boxes).query(areas, predicate="intersects")[0]):
         return
     extent = shapely.total_bounds(areas).tolist()
-    lies = [*corners.min(axis=0).tolist(), *corners.max(axis=0).tolist()]
+    lies = shapely.total_bounds(boxes).tolist()
     raise InputError(
         f"expected new clouds that meet the buildings of {request.run}, which lie in "
         f"{format_box(extent)}, got clouds in {format_box(lies)}; check their place and CRS"

@@ -388,7 +388,7 @@ class Updater:
             return False
         old = self.epochs.old.choose({})
         bare = old.bare(job, old.select_roof_points(job), old.select_other_points(job))
-        bare = bare[shapely.intersects_xy(job.area, bare[:, 0], bare[:, 1])]
+        bare = bare[shapely.intersects_xy(job.area, bare[:, :2])]
         cells = np.unique(np.floor(bare[:, :2]), axis=0)
         return len(cells) >= BARE_SHARE * job.area.area
 

@@ -93,7 +93,7 @@ def list_cells(roof: Roof, comparison: CellComparison) -> tuple[np.ndarray, np.n
     cells = np.mgrid[x0 : x1 + 1, y0 : y1 + 1].reshape(2, -1).T
     cells = cells[shapely.intersects_xy(roof.outline, *((cells + 0.5) * side).T)]
     middles = (cells + 0.5) * side
-    is_known = shapely.intersects_xy(shrink_outline(roof.outline), *middles.T)
+    is_known = shapely.intersects_xy(shrink_outline(roof.outline), middles)
     if len(c.number_old):
         keys = np.floor(middles / c.cell_m).astype(np.int64) @ KEY_OF_CELL
         is_known &= np.isin(keys, c.cells[c.n_old > 0].astype(np.int64) @ KEY_OF_CELL)

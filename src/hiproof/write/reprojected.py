@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..errors import InputError
 from ..frames import METRES, Units
@@ -64,7 +65,7 @@ class Reprojected(Units):
             )
         return result
 
-    def to_metres(self, coordinates: np.ndarray) -> np.ndarray:
+    def to_metres(self, coordinates: ArrayLike) -> np.ndarray:
         """Return world metres of the file's coordinates (..., 2) or (..., 3)."""
         coordinates = np.asarray(coordinates, float)
         x, y = coordinates[..., 0], coordinates[..., 1]

@@ -65,7 +65,7 @@ def select_clouds(
     """Return the point files to look for buildings in: all, or those near the box."""
     if request.bbox is None:
         return request.clouds
-    boxes = units.to_metres(list_boxes(headers).reshape(-1, 2)).reshape(-1, 4)
+    boxes = units.to_metres(list_boxes(headers))
     gaps = shapely.distance(shapely.box(*box_in_metres(request.bbox, units)), shapely.box(*boxes.T))
     distant = {header.path for header, gap in zip(headers, gaps, strict=True) if gap > MOST_BLOCK_M}
     return tuple(name for name in request.clouds if name not in distant)
@@ -73,7 +73,7 @@ def select_clouds(
 
 def box_in_metres(box: Box, units: Units) -> Box:
     """Convert a box in `units` to world metres."""
-    xmin, ymin, xmax, ymax = units.to_metres(np.reshape(box, (2, 2)).astype(float)).ravel()
+    xmin, ymin, xmax, ymax = units.to_metres(box)
     return xmin, ymin, xmax, ymax
 
 

@@ -64,7 +64,7 @@ def make_plan(request: Request, progress: Progress = lambda *_: None) -> WorkPla
     # opened only to be told now if it cannot be read, and not after all points are sorted
     terrain = read_terrain(request.terrain, frame.crs, frame.units) if request.terrain else None
     if terrain is not None and not request.footprints:
-        terrain.knows_any(list_places(frame.units.to_metres(plan_bounds(headers).reshape(-1, 2))))
+        terrain.knows_any(list_places(frame.units.to_metres(plan_bounds(headers))))
     settings = settle_classes(request.clouds, request.settings)
     if request.underpasses is not None and not request.footprints:
         raise InputError(
@@ -135,15 +135,12 @@ def check_terrain(terrain: RasterTerrain, jobs: tuple[Job, ...]) -> None:
     warn(terrain.path, f"{lies}, so the ground is taken from the points; check its {advice}")
 
 
-def list_places(corners: np.ndarray) -> np.ndarray:
-    """Return places (k, 2), 8 by 8 of them, over the box of `corners` (n, 2).
+def list_places(boxes: np.ndarray) -> np.ndarray:
+    """Return places (k, 2), 8 by 8 of them, over the `boxes` (n, 4).
 
     Buildings are looked for there first.
     """
-    x, y = (
-        np.linspace(lower, upper, 8)
-        for lower, upper in zip(corners.min(axis=0), corners.max(axis=0), strict=True)
-    )
+    x, y = np.linspace(boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0), 8).T
     return np.column_stack([grid.ravel() for grid in np.meshgrid(x, y)])
 
 
@@ -199,7 +196,7 @@ def jobs_from_footprints(
     if request.bbox and not footprints:
         raise InputError(nothing_in(request.bbox))
     say_if_columns_run_out(str(request.footprints), footprints)
-    bounds = frame.units.to_metres(plan_bounds(headers).reshape(-1, 2)).reshape(-1, 4)
+    bounds = frame.units.to_metres(plan_bounds(headers))
     if len(bounds):
         check_overlap(footprints, bounds.tolist(), frame.footprints, frame.cloud, frame.units)
     is_part = request.where or request.bbox

@@ -93,7 +93,7 @@ def find_registration(
 
     Points are those of the files with `headers`.
     """
-    boxes = units.to_metres(list_boxes(headers).reshape(-1, 2)).reshape(-1, 4)
+    boxes = units.to_metres(list_boxes(headers))
     # the whole plane where a header knows none
     boxes[~np.isfinite(boxes).all(axis=1)] = [-np.inf, -np.inf, np.inf, np.inf]
     polygons = np.array([f.polygon for f in footprints if not f.polygon.is_empty])

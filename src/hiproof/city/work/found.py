@@ -49,7 +49,7 @@ def found_roof(
     from ...classify.surfaces import thin_to_voxels
     from ...fit.site import remark_parcel
 
-    inside = shapely.intersects_xy(area, nearby[:, 0], nearby[:, 1])
+    inside = shapely.intersects_xy(area, nearby[:, :2])
     if not inside.any():
         return FoundRoof(nearby[inside])
     shapely.prepare(area)

@@ -53,7 +53,7 @@ def search_again(plan: WorkPlan, points: dict[str, np.ndarray]) -> WorkPlan:
     classes = np.concatenate(
         [np.full(len(points[kind]), number, np.uint8) for kind, number in kinds.items()]
     )
-    inside = shapely.intersects_xy(job.area, xyz[:, 0], xyz[:, 1])
+    inside = shapely.intersects_xy(job.area, xyz[:, :2])
     buildings = split_buildings(PointCloud(xyz[inside], classes[inside]), plan.settings)
     error = next((building.error for building in buildings if building.error), None)
     return dataclasses.replace(plan, jobs=(dataclasses.replace(job, error=error),))

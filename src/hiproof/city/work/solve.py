@@ -199,7 +199,7 @@ class Surroundings:
         if not self.plan.beyond_m or job.footprint is None:
             return found
         around = self.select_points(job, self.plan.beyond_m)
-        outside = around[~shapely.intersects_xy(job.area, around[:, 0], around[:, 1])]
+        outside = around[~shapely.intersects_xy(job.area, around[:, :2])]
         return dataclasses.replace(found, points=np.concatenate([found.points, outside]))
 
     def select_neighbours(self, job: Job) -> list[shapely.Polygon]:
@@ -276,7 +276,7 @@ class Surroundings:
         """
         points = self.low.inside(box)
         outline = grow_polygon(shapely.simplify(job.area, COARSEST_THINNING_M), BESIDE_M)
-        is_beside = ~shapely.intersects_xy(outline, points[:, 0], points[:, 1])
+        is_beside = ~shapely.intersects_xy(outline, points[:, :2])
         return self.low if is_beside.sum() >= FEWEST_BESIDE else Cells(points[:0])
 
     def choose_terrain(self, job: Job) -> TerrainChain | None:

@@ -265,7 +265,7 @@ def wanted_points(
         return iter_points(path, units=units)
     header = read_header(path)
     west, south, _, east, north, _ = header.bounds
-    box = units.to_metres(np.array([[west, south], [east, north]], float)).ravel()
+    box = units.to_metres(np.array([west, south, east, north]))
     if is_whole:
         return iter_points(path, units=units, noted=None if is_copc(path) else result)
     if reaches.is_partial and np.isfinite(box).all() and not len(reaches.near(box)):
@@ -275,7 +275,7 @@ def wanted_points(
     index = read_lax(path) or load_run_boxes(noted, header.count)
     if index is None:
         return iter_points(path, units=units, noted=result)
-    boxes = units.from_metres(reaches.bounds.reshape(-1, 2)).reshape(-1, 4)
+    boxes = units.from_metres(reaches.bounds)
     return iter_points(path, runs=index.find_runs(boxes), units=units)
 
 

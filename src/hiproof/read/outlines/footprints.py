@@ -91,9 +91,7 @@ def read_footprints(
 
 def meets(polygon: shapely.Polygon, bbox: Box, units: Units) -> bool:
     """Return whether a polygon in world metres meets a box in `units`."""
-    return bool(
-        shapely.intersects(polygon, shapely.box(*units.to_metres(np.reshape(bbox, (2, 2))).ravel()))
-    )
+    return bool(shapely.intersects(polygon, shapely.box(*units.to_metres(bbox))))
 
 
 def footprint_crs(path: str | Path, layer: str | int | None = None) -> CRS | None:
