@@ -171,6 +171,25 @@ def test_a_function_that_compiled_code_called_is_called_by_python_as_well(town):
     assert printed.split() == ["61", "30", "30"]
 
 
+def test_python_gives_an_address_of_a_tuple_and_keeps_its_arrays(town):
+    """No call leaves a reference behind, and an array that comes back is the one that was given."""
+    (town / "town" / "pairs.py").write_text(PAIRS)
+    script = """
+import sys
+import numpy as np
+from town.pairs import Pair, swapped
+pair = Pair(np.arange(3.0), np.ones(2, bool))
+before = sys.getrefcount(pair.first)
+for _ in range(3):
+    assert swapped(pair).second is pair.first
+try:
+    swapped(Pair(pair.first[:0], pair.second))
+except ValueError:
+    print(sys.getrefcount(pair.first) - before, pair.first)
+"""
+    assert run(town, script) == "0 [0. 1. 2.]\n"
+
+
 def test_a_wrapper_made_for_loaded_code_carries_arrays_tuples_and_errors(town):
     (town / "town" / "pairs.py").write_text(PAIRS)
     assert run(town, ASK_PAIRS) == "[0. 0.] [ True]\n"

@@ -38,6 +38,7 @@ from numba.core.registry import CPUDispatcher
 from numba.core.runtime import rtsys
 
 from . import news
+from .borrow import borrow
 from .kept import Kept, place_to_write
 from .stamp import compute_stamp
 
@@ -176,11 +177,16 @@ class Dispatcher(CPUDispatcher):
         args = tuple(sigutils.normalize_signature(signature)[0])
         with global_compiler_lock:
             if args not in self.entries:
-                self.load(args)
-                result = self.overloads[args]
-                self.entries[args] = self.make_entry(args, result)
-                super().add_overload(result._replace(entry_point=self.entries[args]))
-                self.overloads[args] = result
+                taken = tuple(map(borrow, args))
+                self.load(taken)
+                result = self.overloads[taken]
+                self.entries[args] = self.make_entry(taken, result)
+                given = typing.signature(result.signature.return_type, *args)
+                super().add_overload(
+                    result._replace(entry_point=self.entries[args], signature=given)
+                )
+                del self.overloads[args]
+                self.overloads[taken] = result
             return self.entries[args]
 
     def make_entry(self, args: tuple, result: Any) -> Any:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import numpy as np
 
 from ...compiled import compiled
-from ...compiled.borrow import borrow
 from ..prices import NARROW_M
 from .draw import is_near, widen_box
 from .moves import (
@@ -171,7 +170,6 @@ def improve(roof, trial, site, drawing, asked, rounds):
 
     Returns its price (points).
     """
-    roof, trial, site, drawing = borrow(roof), borrow(trial), borrow(site), borrow(drawing)
     size = len(roof.sides)
     changed, room = np.zeros(size, np.bool_), np.empty((size, 4))
     questions, touched = np.where(asked, ALL_MOVES, NO_MOVES), np.zeros(size, np.int64)

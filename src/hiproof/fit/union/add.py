@@ -7,7 +7,6 @@ from collections import namedtuple
 import numpy as np
 
 from ...compiled import compiled
-from ...compiled.borrow import borrow
 from .around import measure_context
 from .candidates import SAME_SLOPE, find_best_rectangles
 from .edges import EVERYWHERE, NO_GAIN, move_edges
@@ -62,7 +61,6 @@ def add_candidates(volumes, value, ground, candidates, additions, known_count, k
     ends when the roof has as many volumes as a known one (`known_count`, 0 without one) and costs
     as much: nothing can be added to that roof.
     """
-    ground = borrow(ground)
     scene = ground.scene
     while additions > 0:
         additions -= 1

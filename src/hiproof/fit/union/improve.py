@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 from ...compiled import compiled
-from ...compiled.borrow import borrow
 from .around import measure_context
 from .edges import EVERYWHERE, NO_GAIN, move_edges
 from .facings import face_walls
@@ -34,7 +33,6 @@ def improve(volumes, scene, value, slopes, rounds):
     It ends earlier if a round brings next to nothing. A volume that no move changed is left alone
     until something around it changes.
     """
-    scene = borrow(scene)
     for _ in range(rounds):
         value_before = value
         for k in range(len(volumes)):
