@@ -133,7 +133,8 @@ def judge(trial, site, drawing, view, boxes, points, weight, costs, units):
     for box in boxes:
         if gain <= 0.0:
             return 0.0
-        gain -= site.unit * price_drawing(trial, drawing, site, widen(box, BESIDE_M))
+        units = gain / site.unit
+        gain -= site.unit * price_drawing(trial, drawing, site, widen(box, BESIDE_M), units)
     return gain
 
 

@@ -146,18 +146,23 @@ def price_misfit(roof, site, view, points):
 
 
 @compiled
-def price_drawing(roof, drawing, site, box):
-    """Return the units of the corners and steps that are drawn in a box."""
-    corners, steps = draw_structure(roof, drawing, site, box)
+def price_drawing(roof, drawing, site, box, most):
+    """Return the units of what is drawn in a box, without steps if corners cost `most`."""
+    corners, steps = draw_structure(roof, drawing, site, box, most)
     return CORNER_UNITS * len(corners) + steps[:, 2].sum()
 
 
 @compiled
-def draw_structure(roof, drawing, site, box):
-    """Draw a box. Returns its corners (c, 2), and its steps (s, 3) with what they cost (units)."""
+def draw_structure(roof, drawing, site, box, most):
+    """Draw a box. Returns its corners (c, 2), and its steps (s, 3) with what they cost (units).
+
+    Steps are not drawn where corners cost `most` units or more.
+    """
     draw(roof, drawing, list_view(roof, box.reshape(1, 4)), site, box)
-    view = list_view(roof, widen(box, NARROW_M).reshape(1, 4))
     corners = list_corners(roof, drawing, box)
+    if CORNER_UNITS * len(corners) >= most:
+        return corners, np.empty((0, 3))
+    view = list_view(roof, widen(box, NARROW_M).reshape(1, 4))
     return corners, list_steps(roof, drawing, view, site, box)
 
 
@@ -259,7 +264,7 @@ def price_all_units(roof, site):
 def know(roof, drawing, site):
     """Return what is known of a roof."""
     box = np.array([-np.inf, np.inf, -np.inf, np.inf])
-    corners, steps = draw_structure(roof, drawing, site, box)
+    corners, steps = draw_structure(roof, drawing, site, box, np.inf)
     return Known(
         compute_costs(roof, site, list_view(roof, box.reshape(1, 4)), np.arange(len(site.x))),
         corners,
@@ -278,7 +283,7 @@ def know_change(roof, drawing, site, boxes, reach, known):
     known.costs[points] = compute_costs(roof, site, list_view(roof, boxes), points)
     for box in boxes:
         wide = widen(box, reach)
-        new_corners, new_steps = draw_structure(roof, drawing, site, wide)
+        new_corners, new_steps = draw_structure(roof, drawing, site, wide, np.inf)
         corners = replace_inside(corners, new_corners, wide)
         steps = replace_inside(steps, new_steps, wide)
     return Known(known.costs, corners, steps, price_all_units(roof, site))
