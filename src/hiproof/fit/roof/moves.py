@@ -280,7 +280,7 @@ def note_line(half, x, y, a, b, c, kind, number, near, found):
     if abs(gap) < 1e-4 and abs(cosine) > 1.0 - 1e-7:
         return found
     for q in range(found):
-        if abs(near[q, 0] - abs(gap)) < 1e-4 and near[q, 1] == kind:
+        if abs(near[q, 0] - abs(gap)) < 1e-4:
             return found
     place = found
     while place > 0 and near[place - 1, 0] > abs(gap):

@@ -106,13 +106,10 @@ def is_loose(volumes, scene, k, edge):
     """
     direction, axis, place = int(volumes[k, DIRECTION]), edge // 2, volumes[k, U0 + edge]
     vertices = scene.vertices[direction, axis]
-    lowest = highest = vertices[0]
-    is_corner = False
-    for m in range(len(vertices)):
-        if vertices[m] < np.inf:
-            highest = vertices[m]
-            is_corner |= abs(highest - place) < SAME_LINE_M
-    if is_corner or place < lowest + BORDER_M or place > highest - BORDER_M:
+    last = np.searchsorted(vertices, np.inf) - 1
+    if place < vertices[0] + BORDER_M or place > vertices[last] - BORDER_M:
+        return False
+    if vertices[np.searchsorted(vertices, place - SAME_LINE_M)] < place + SAME_LINE_M:
         return False
     for j in range(1, len(volumes)):
         if j != k and int(volumes[j, DIRECTION]) == direction:
