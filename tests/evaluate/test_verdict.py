@@ -19,6 +19,7 @@ from hiproof.cli.running import graded_words
 from hiproof.cli.status import describe, read_state
 from hiproof.compose import compose
 from hiproof.evaluate.layers import REACH, find_second_surface, unseen_share
+from hiproof.evaluate.metrics import FACADE_M
 from hiproof.evaluate.verdict import FEWEST_ON_PART, judge_model
 from hiproof.model import Model
 from hiproof.model.heights import find_highest
@@ -338,8 +339,10 @@ def test_the_share_without_points_is_that_of_all_distances_to_a_fine_grid(seed, 
     assume(len(visible) >= 100)  # as many places are asked
     west, south, east, north = roof.outline.bounds
     grid = np.stack(np.meshgrid(np.linspace(west, east, 101), np.linspace(south, north, 101)), -1)
-    grid = grid[shapely.intersects_xy(roof.outline, grid[..., 0], grid[..., 1])]
-    gaps = np.array([np.hypot(*(visible[:, :2] - place).T).min() for place in grid])
+    inner = roof.outline.buffer(-FACADE_M)  # walls of neighbours show nothing of a roof
+    grid = grid[shapely.intersects_xy(inner, grid[..., 0], grid[..., 1])]
+    inside = visible[shapely.intersects_xy(inner, *visible[:, :2].T), :2]
+    gaps = np.array([np.hypot(*(inside - place).T).min() for place in grid])
     share = np.mean(gaps > REACH * np.sqrt(roof.outline.area / len(visible)))
     assert unseen_share(visible, roof.outline) == pytest.approx(share, abs=0.1)
 
@@ -351,6 +354,18 @@ def test_a_score_of_points_in_a_corner_of_a_large_outline_leaves_the_rest_unseen
     assert 12 <= len(points) < 30
     assert unseen_share(points, shapely.box(0, 0, 15, 10)) > 0.6
     assert unseen_share(points, shapely.box(0, 0, 2.5, 2.5)) == 0.0
+
+
+@pytest.mark.parametrize("density", [2.0, 6.0, 15.0])
+def test_a_rim_of_points_shows_no_roof(density):
+    """Two sheds of Delft have points along their outlines alone, and were good."""
+    outline = shapely.box(0, 0, 6.0, 3.8)
+    points = sample_heights(lambda x, y: np.full(len(x), 2.9), outline, density=density)
+    rim = points[~shapely.intersects_xy(outline.buffer(-0.28), *points[:, :2].T)]
+    assert len(rim) >= 10 and unseen_share(rim, outline) > 0.6
+    building = hiproof.reconstruct(rim, outline)
+    assert building.grade is not Grade.GOOD
+    assert "of its outline hold no points" in building.detail
 
 
 def test_a_building_says_that_half_of_it_has_no_points():

@@ -19,7 +19,7 @@ from scipy.spatial import cKDTree
 from ..geometry.point_in_polygon import find_inside
 from ..model import Roof
 from ..model.heights import find_highest
-from .metrics import NEAR_M, Inner, well_inside
+from .metrics import FACADE_M, NEAR_M, Inner, well_inside
 
 # Points a cell holds in the mean: with fewer chance makes two groups, with more a cell is as large
 # as what stands on a roof.
@@ -52,9 +52,13 @@ def unseen_share(points: np.ndarray, outline: shapely.Polygon) -> float:
     """Return the share of the outline that has no `points` (n, 2 or 3) near.
 
     It asks as many places as there are points, evenly spread. So the share does not depend on their
-    density, and a strip without points shows however large the building is.
+    density, and a strip without points shows however large the building is. Places and points along
+    the outline do not count: what stands beside a building, or its rim, has points there, too.
     """
-    if not len(points):
+    inner = shapely.buffer(outline, -FACADE_M)
+    inner = outline if inner.is_empty else inner
+    inside = points[find_inside(inner, *points[:, :2].T), :2]
+    if not len(inside):
         return 1.0
     gap_m = math.sqrt(outline.area / len(points))
     west, south, east, north = outline.bounds
@@ -62,8 +66,8 @@ def unseen_share(points: np.ndarray, outline: shapely.Polygon) -> float:
         np.arange(west + 0.5 * gap_m, east, gap_m), np.arange(south + 0.5 * gap_m, north, gap_m)
     )
     places = np.column_stack([x.ravel(), y.ravel()])
-    places = places[find_inside(outline, *places.T)]
-    near_m, _ = cKDTree(points[:, :2]).query(places, distance_upper_bound=REACH * gap_m)
+    places = places[find_inside(inner, *places.T)]
+    near_m, _ = cKDTree(inside).query(places, distance_upper_bound=REACH * gap_m)
     return float(np.mean(np.isinf(near_m))) if len(places) else 0.0
 
 

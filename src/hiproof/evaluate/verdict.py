@@ -4,7 +4,7 @@ A point off the roof that lies on one of the model's walls is a facade return an
 way. All other points are roof points. Five findings speak against a model:
 
     off the roof    many roof points lie more than 0.2 m above or below it
-    unseen          no roof point lies near a part of the outline
+    unseen          no roof point inside the outline lies near a part of it
     above, below    in a place of several square metres most points lie off the roof, or a tower
                     stands over it, farther inside than the walls of taller neighbours
     tilted          over a large part of the roof the points rise another way
