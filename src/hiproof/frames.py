@@ -6,6 +6,7 @@ has a local origin, so that all geometry runs on small float64; the search for i
 into the roof's own axes.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,6 +60,12 @@ class Units:
 
 
 METRES = Units()
+
+
+def turn_points(xy: np.ndarray, angle: float) -> np.ndarray:
+    """Turn plan points (..., 2) by `angle` (rad) about the origin."""
+    cosine, sine = math.cos(angle), math.sin(angle)
+    return xy @ np.array([(cosine, sine), (-sine, cosine)])
 
 
 @dataclass(frozen=True)

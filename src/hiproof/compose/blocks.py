@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from itertools import pairwise
 
@@ -10,7 +9,7 @@ import numpy as np
 import shapely
 
 from ..errors import CompositionError
-from ..frames import LocalFrame
+from ..frames import LocalFrame, turn_points
 from ..model import GROUND, ROOF, WALL, Face, Installation, Part, Piece, Roof, Solid
 from .settle import PLAN_DIGITS
 from .solid import compose
@@ -77,10 +76,9 @@ def make_box(installation: Installation) -> Solid:
     >>> make_box(Installation("chimney", 1.0, 0.5, 2.0)).volume
     1.0
     """
-    c, s = math.cos(installation.kappa), math.sin(installation.kappa)
     half = 0.5 * np.array([installation.length, installation.width])
     corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * half
     x, y, z = installation.position
-    plan = np.round(corners @ np.array([[c, s], [-s, c]]) + [x, y], PLAN_DIGITS)
+    plan = np.round(turn_points(corners, installation.kappa) + [x, y], PLAN_DIGITS)
     low, high = (round(level, PLAN_DIGITS) for level in (z, z + installation.height))
     return block(shapely.Polygon(plan), low, high)

@@ -18,7 +18,6 @@ from ..geometry.components import label_components
 from ..geometry.rings import list_between
 from ..model import WALL, Face, Solid
 from .arrangement import COLLINEAR_UNITS, GRID_M
-from .shell import simple_loops
 
 Item = TypeVar("Item")
 
@@ -175,6 +174,25 @@ def trace_loops(edges: Iterable[tuple[Any, Any]]) -> list[list[Any]]:
             while following := follow[walk[-1]]:
                 walk.append(following.pop())
             loops += [loop for loop in simple_loops(walk[:-1]) if len(loop) > 2]
+    return loops
+
+
+def simple_loops(ring: list[Item]) -> list[list[Item]]:
+    """Cut a closed walk into loops that visit no vertex twice."""
+    loops: list[list[Item]] = []
+    path: list[Item] = []
+    position: dict[Item, int] = {}
+    for vertex in ring:
+        if vertex in position:
+            cut = position[vertex]
+            loop = path[cut:]
+            for dropped in loop:
+                position.pop(dropped)
+            path = path[:cut]
+            loops.append(loop)
+        position[vertex] = len(path)
+        path.append(vertex)
+    loops.append(path)
     return loops
 
 

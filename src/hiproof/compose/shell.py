@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TypeVar
 
 import numpy as np
 
@@ -14,8 +13,6 @@ from ..model import GROUND, ROOF, WALL, Face, Solid
 from .arrangement import COLLINEAR_UNITS, GRID_M, OUTSIDE, heights
 from .cells import PlanCells, PlanProblem
 from .levels import Levels, find_saddles, split_at_crossings, stack_levels
-
-Item = TypeVar("Item")
 
 SETBACK_M = 0.01  # m that a crosswise corner is cut back by; ten times what makes two points one
 
@@ -100,25 +97,6 @@ def walks(follow: list[int], selection: list[bool]) -> list[list[int]]:
     return result
 
 
-def simple_loops(ring: list[Item]) -> list[list[Item]]:
-    """Cut a closed walk into loops that visit no vertex twice."""
-    loops: list[list[Item]] = []
-    path: list[Item] = []
-    position: dict[Item, int] = {}
-    for vertex in ring:
-        if vertex in position:
-            cut = position[vertex]
-            loop = path[cut:]
-            for dropped in loop:
-                position.pop(dropped)
-            path = path[:cut]
-            loops.append(loop)
-        position[vertex] = len(path)
-        path.append(vertex)
-    loops.append(path)
-    return loops
-
-
 def signed_area(ring: list[int], xyz: list[list[float]]) -> float:
     """Plan area of a ring of vertex indices, positive counter-clockwise."""
     x0, y0, _ = xyz[ring[0]]
@@ -139,7 +117,7 @@ def roof_faces(
     label_of = {}
     for walk in walks(follow, [current != OUTSIDE for current in label]):
         label_of[face[walk[0]]] = label[walk[0]]
-        rings_of.setdefault(face[walk[0]], []).extend(simple_loops([level[h] for h in walk]))
+        rings_of.setdefault(face[walk[0]], []).append([level[h] for h in walk])
     faces = []
     for cell, rings in rings_of.items():
         if len(rings) > 1:
@@ -156,9 +134,10 @@ def ground_face(
     It has the walks around the outside, which run counter-clockwise seen from below. `skip` are
     ground vertices in the middle of a straight wall, which nothing else needs.
     """
-    rings = []
-    for walk in walks(follow, [current == OUTSIDE for current in label]):
-        rings += simple_loops([level[h] for h in walk if level[h] not in skip])
+    rings = [
+        [level[h] for h in walk if level[h] not in skip]
+        for walk in walks(follow, [current == OUTSIDE for current in label])
+    ]
     if len(rings) > 1:
         rings.sort(key=lambda ring: signed_area(ring, xyz))
     return Face(tuple(map(tuple, rings)), GROUND)

@@ -22,7 +22,7 @@ from ..compose.settle import (
     settled_sigma,
 )
 from ..errors import InputError
-from ..frames import LocalFrame
+from ..frames import LocalFrame, turn_points
 from ..geometry.rings import intersect, repair_polygons
 from ..model import Building, Part, Quality, Roof
 from ..model.installation import CHIMNEY, ROOF_OBJECT
@@ -240,8 +240,7 @@ def cut_plan(
 
 def place_plan(uv: np.ndarray, position: np.ndarray, kappa: float) -> shapely.Polygon:
     """Return the polygon of corners (n, 2) along and across a part, about the origin."""
-    c, s = math.cos(kappa), math.sin(kappa)
-    return shapely.Polygon(uv @ np.array([[c, s], [-s, c]]) + position[:2])
+    return shapely.Polygon(turn_points(uv, kappa) + position[:2])
 
 
 def clip(area: shapely.Polygon, outline: shapely.Polygon) -> list[shapely.Polygon]:

@@ -27,6 +27,7 @@ import numpy as np
 import shapely
 
 from ..errors import FitError
+from ..frames import turn_points
 from ..model import Part, Piece
 from .algebra import Formula, formula
 
@@ -315,10 +316,9 @@ class Primitive:
     def part(self, theta: np.ndarray, sigma: Mapping[str, float] | None = None) -> Part:
         """Return the part of `theta` (9,) in its frame, a rectangle a tooth, or its own plan."""
         theta_p, kappa, translation = self.from_theta(theta)
-        c, s = math.cos(kappa), math.sin(kappa)
         planes = self.planes_at(theta)
         outlines = [
-            shapely.polygons(translation[:2] + ring @ np.array([[c, s], [-s, c]]))
+            shapely.polygons(translation[:2] + turn_points(ring, kappa))
             for ring in self.plan_rings(theta)
         ]
         if self.strips == 1:

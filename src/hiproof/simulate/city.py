@@ -19,9 +19,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import InputError, OutputError
-from ..frames import Box
+from ..frames import Box, turn_points
 from .relief import Relief
-from .roofs import SimBuilding, turn_points
+from .roofs import SimBuilding
 from .scanner import ScanSettings
 from .survey import Flight, divide_into_patches, survey, write_footprints, write_laz
 from .town import TOWN, Lot, furnish_lot, street_side

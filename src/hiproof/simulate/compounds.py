@@ -14,6 +14,7 @@ import math
 import numpy as np
 
 from ..errors import InputError
+from ..frames import turn_points
 from ..model import Part
 from .roofs import SimBuilding, assemble, make_part, random_eave, random_parameters
 
@@ -49,8 +50,7 @@ class CompoundLayout:
         z: float,
         quarters: int = 0,
     ) -> Part:
-        cosine, sine = math.cos(self.kappa), math.sin(self.kappa)
-        translation = np.array([cosine * u - sine * v, sine * u + cosine * v, z])
+        translation = np.append(turn_points(np.array([u, v]), self.kappa), z)
         return make_part(type, parameters, self.kappa + quarters * math.pi / 2, translation)
 
 

@@ -9,8 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
+from ..frames import turn_points
 from .relief import Relief
-from .roofs import SimBuilding, turn_points
+from .roofs import SimBuilding
 from .scanner import ScanSettings
 from .survey import (
     CRS,

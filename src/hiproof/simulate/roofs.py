@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 
 from ..errors import InputError
-from ..frames import LocalFrame
+from ..frames import LocalFrame, turn_points
 from ..model import Part, Piece, Roof
 from ..primitives import CATALOGUE, get
 
@@ -45,10 +45,9 @@ def box(
     xy: np.ndarray, size: tuple[float, float], z_top: float, kappa: float, rise: float = 0.0
 ) -> Piece:
     """Return a block about `xy` turned by `kappa`, flat, or a gable with `rise`, at `z_top`."""
-    cosine, sine = math.cos(kappa), math.sin(kappa)
     corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * (size[0] / 2, size[1] / 2)
-    outline = shapely.Polygon(corners @ np.array([(cosine, sine), (-sine, cosine)]) + xy)
-    across, slope = np.array([-sine, cosine]), 2 * rise / size[1]
+    outline = shapely.Polygon(turn_points(corners, kappa) + xy)
+    across, slope = np.array([-math.sin(kappa), math.cos(kappa)]), 2 * rise / size[1]
     signs = np.array([1.0, -1.0]) if rise else np.array([0.0])
     gradient = signs[:, None] * slope * across
     return Piece(outline, np.column_stack([gradient, z_top - gradient @ xy]))
@@ -149,17 +148,6 @@ def find_largest_part(roof: Roof) -> Part:
     return max(roof.parts, key=lambda part: part.area)
 
 
-def turn_building(building: SimBuilding, angle: float) -> SimBuilding:
-    """Turn a building by `angle` (rad) about its frame's origin."""
-    parts = []
-    for part in building.roof.parts:
-        translation = np.append(
-            turn_points(part.translation[None, :2], angle)[0], part.translation[2]
-        )
-        parts.append(make_part(part.type, part.parameters, part.kappa + angle, translation))
-    return assemble(tuple(parts), building.kind, building.roof.frame.origin)
-
-
 def united_outline(parts: tuple[Part, ...]) -> shapely.Polygon:
     """Return the union of all pieces, joined in the first part's axes, on common lines."""
     outlines = [piece.outline for part in parts for piece in part.pieces]
@@ -171,12 +159,6 @@ def united_outline(parts: tuple[Part, ...]) -> shapely.Polygon:
     ]
     union = shapely.union_all(aligned, grid_size=1e-6).normalize().reverse()
     return shapely.transform(union.simplify(0.0), lambda xy: turn_points(xy, parts[0].kappa))
-
-
-def turn_points(xy: np.ndarray, angle: float) -> np.ndarray:
-    """Plan points (n, 2) turned by `angle` (rad) about the origin."""
-    cosine, sine = math.cos(angle), math.sin(angle)
-    return xy @ np.array([(cosine, sine), (-sine, cosine)])
 
 
 def random_eave(rng: np.random.Generator) -> float:

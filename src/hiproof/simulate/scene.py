@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 
 from ..errors import InputError
-from ..frames import Box
+from ..frames import Box, turn_points
 from ..geometry.rings import ring_normal
 from ..model import ROOF, Piece, Solid
 from .relief import Plane, Relief
@@ -22,7 +22,6 @@ from .roofs import (
     find_label,
     make_part,
     random_parameters,
-    turn_points,
 )
 
 # what a beam met, by its place in SOURCES

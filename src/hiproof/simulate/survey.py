@@ -11,10 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import OutputError
-from ..frames import Box
+from ..frames import Box, turn_points
 from .flight import Swath, join_beams, make_beams
 from .relief import Relief
-from .roofs import turn_points
 from .scanner import Scan, ScanSettings, returns, with_outliers
 from .scene import SOURCE_GROUND, SOURCE_TREE
 from .town import Lot, town_scene

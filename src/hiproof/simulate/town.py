@@ -7,7 +7,6 @@ city again without the rest.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
@@ -15,11 +14,11 @@ import numpy as np
 import shapely
 
 from ..data_files import read_data_file
-from ..frames import Box, LocalFrame
+from ..frames import Box, LocalFrame, turn_points
 from ..model import Roof
 from .compounds import COMPOUND_KINDS, random_compound
 from .relief import Relief
-from .roofs import SimBuilding, find_largest_part, random_building, turn_building, turn_points
+from .roofs import SimBuilding, find_largest_part, random_building
 from .scene import Body, Defects, Scene, building_bodies, make_scene, superstructures, trees
 
 TOWN = read_data_file("towns")
@@ -90,16 +89,13 @@ def street_side(
     """Return buildings side by side along `heading` (rad) from `start` (2,).
 
     They stand to its left, within `length` by `depth` metres. `names` are taken one after the other
-    until the side is full; a building deeper than the plot is turned, and left out where that does
-    not help. Terraced rows come back as their houses half of the time.
+    until the side is full; a building deeper than the plot is left out. Terraced rows come back as
+    their houses half of the time.
     """
     along, placed = 0.0, []
     for name in names:
         building = make(rng, name, heading + rng.normal(0.0, 0.015))
         lower, upper = extent(building, heading)
-        if upper[1] - lower[1] > depth:
-            building = turn_building(building, math.pi / 2)
-            lower, upper = extent(building, heading)
         if upper[1] - lower[1] > depth:
             continue
         if along + upper[0] - lower[0] > length:
