@@ -1,11 +1,27 @@
-"""Tables that stand in files of `data`, beside the code."""
+"""Files that stand beside the code: tables in `data`, and what pages are made of."""
 
 import tomllib
+from collections.abc import Mapping
 from importlib import resources
 from typing import Any
 
 
 def read_data_file(name: str) -> dict[str, Any]:
     """Read data/NAME.toml."""
-    file = resources.files("hiproof") / "data" / f"{name}.toml"
-    return tomllib.loads(file.read_text(encoding="utf-8"))
+    return tomllib.loads(read_asset(f"data/{name}.toml"))
+
+
+def read_asset(place: str) -> str:
+    """Read a text file of the package, such as "view/assets/view.html"."""
+    return (resources.files("hiproof") / place).read_text(encoding="utf-8")
+
+
+def fill_page(page: str, content: Mapping[str, str]) -> str:
+    """Return a page with texts in place of its comments of their names.
+
+    >>> fill_page("<h1><!--title--></h1>", {"title": "Delft"})
+    '<h1>Delft</h1>'
+    """
+    for name, text in content.items():
+        page = page.replace(f"<!--{name}-->", text)
+    return page

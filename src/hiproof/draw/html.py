@@ -5,10 +5,10 @@ from __future__ import annotations
 import hashlib
 import json
 from html import escape
-from importlib.resources import files
 
 import numpy as np
 
+from ..data_files import read_asset
 from ..errors import escape_unseen
 from ..model import Building, Part
 from ..write.attribute_list import ANGLES
@@ -62,7 +62,7 @@ def render_view(building: Building) -> str:
         for face in select_seen_faces(solid, colours, turn)
     )
     box = f"{-VIEW_SIZE[0] / 2} {-VIEW_SIZE[1] / 2} {VIEW_SIZE[0]} {VIEW_SIZE[1]}"
-    script = (files("hiproof.draw") / "turn.js").read_text(encoding="utf-8")
+    script = read_asset("draw/turn.js")
     return (
         f'<svg id="{name}" width="{VIEW_SIZE[0]}" height="{VIEW_SIZE[1]}" viewBox="{box}" '
         'style="cursor:grab;touch-action:none" tabindex="0" role="application" '

@@ -10,13 +10,13 @@ from __future__ import annotations
 import json
 import secrets
 from collections.abc import Callable, Mapping
-from importlib.resources import files
 from typing import Any
 from urllib.parse import parse_qs, unquote, urlsplit
 
+from ..data_files import read_asset
 from ..errors import HiproofError, InputError, OutputError
 from ..log import LOGGER
-from ..loopback import HTML, LOOPBACK, Answer, Headers, LoopbackHandler, LoopbackServer, refusal
+from ..loopback import HTML, LOOPBACK, Answer, Headers, LoopbackHandler, LoopbackServer
 from ..primitives.catalogue import CATALOGUE
 from ..write.colours import page_colours
 from .desk import Desk, render_drawing
@@ -27,12 +27,12 @@ SCRIPT = "text/javascript; charset=utf-8"
 STYLE = "text/css; charset=utf-8"
 SVG = "image/svg+xml"
 EDIT_ASSETS = {
-    "": ("hiproof.edit", "assets/edit.html", HTML),
-    "page.css": ("hiproof.evaluate", "assets/page.css", STYLE),
-    "edit.css": ("hiproof.edit", "assets/edit.css", STYLE),
-    "edit.js": ("hiproof.edit", "assets/edit.js", SCRIPT),
-    "handles.js": ("hiproof.edit", "assets/handles.js", SCRIPT),
-    "viewer.js": ("hiproof.evaluate", "assets/viewer.js", SCRIPT),
+    "": ("edit/assets/edit.html", HTML),
+    "page.css": ("evaluate/assets/page.css", STYLE),
+    "edit.css": ("edit/assets/edit.css", STYLE),
+    "edit.js": ("edit/assets/edit.js", SCRIPT),
+    "handles.js": ("edit/assets/handles.js", SCRIPT),
+    "viewer.js": ("evaluate/assets/viewer.js", SCRIPT),
 }
 
 
@@ -94,8 +94,6 @@ class Service:
 
     def refusal(self, method: str, target: str, headers: Headers) -> Answer | None:
         """Return an answer to those who may not ask, None to those who may."""
-        if entries := refusal(headers, self.port):
-            return make_answer(403, entries)
         first = urlsplit(target).path.split("/")[1:2]
         if not first or not secrets.compare_digest(first[0].encode(), self.token.encode()):
             return make_answer(
@@ -109,8 +107,8 @@ class Service:
     def asset(self, name: str, query: Mapping[str, str]) -> Answer:
         """Return what is read: a file of the page, a figure, or JSON."""
         if name in EDIT_ASSETS:
-            package, file, kind = EDIT_ASSETS[name]
-            return Answer(200, (files(package) / file).read_bytes(), kind)
+            place, kind = EDIT_ASSETS[name]
+            return Answer(200, read_asset(place).encode(), kind)
         if name == "drawing":
             return Answer(200, render_drawing(query.get("type", "")).encode(), SVG)
         if name not in self.read:

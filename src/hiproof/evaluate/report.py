@@ -12,13 +12,13 @@ import json
 from collections import Counter
 from collections.abc import Sequence
 from html import escape
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from .. import __version__
+from ..data_files import fill_page, read_asset
 from ..errors import escape_unseen
 from ..log import count_things
 from ..masking import masked_values
@@ -30,6 +30,8 @@ from .overview import BuildingOutcome, Overview, show_command
 from .report_data import places_on_map, report_data
 from .report_pictures import building_pictures, histogram
 from .run import EvaluatedRun
+
+ASSETS = "evaluate/assets"  # the folder of what the page is made of
 
 WORST = 20  # buildings shown with pictures: as many as are read to the end
 # Buildings on the map and in the 3D view, about 10 kB each: beyond this, browsers grow slow.
@@ -120,7 +122,7 @@ def report_html(
     scripts = ["viewer.js", "report.js", *(["changes.js"] if scenes else [])]
     sections = {
         "title": escape(title),
-        "style": read_asset("page.css") + read_asset("report.css"),
+        "style": read_asset(f"{ASSETS}/page.css") + read_asset(f"{ASSETS}/report.css"),
         "lead": lead(run, len(buildings)),
         "next": list_next_steps(run),
         "attention": attention_list(run),
@@ -132,16 +134,9 @@ def report_html(
         "worst": worst_buildings(run, worst, buildings),
         "record": f'<pre tabindex="0" role="region" aria-label="run.json">{escape(record)}</pre>',
         "data": embed_json(report_data(places, places_on_map(places)) | {"changes": scenes}),
-        "script": "".join(map(read_asset, scripts)),
+        "script": "".join(read_asset(f"{ASSETS}/{name}") for name in scripts),
     }
-    page = read_asset("report.html")
-    for name, content in sections.items():
-        page = page.replace(f"<!--{name}-->", content)
-    return page
-
-
-def read_asset(name: str) -> str:
-    return (files("hiproof.evaluate") / "assets" / name).read_text(encoding="utf-8")
+    return fill_page(read_asset(f"{ASSETS}/report.html"), sections)
 
 
 def embed_json(data: Any) -> str:

@@ -11,11 +11,12 @@ from typing import Any
 
 import numpy as np
 
+from ..data_files import fill_page, read_asset
 from ..errors import escape_unseen
 from ..evaluate.inputs import locate_input
 from ..evaluate.metrics import psd
 from ..evaluate.models import BuildingModel
-from ..evaluate.report import read_asset
+from ..evaluate.report import ASSETS
 from ..evaluate.report_pictures import building_pictures
 from ..evaluate.run import EvaluatedRun, evaluate_run
 from ..read.models.damage import Damaged, refuse
@@ -105,14 +106,14 @@ def draw_changes(
         draw_card(run, after, earlier, before, number)
         for number, (after, before) in enumerate(pairs)
     ]
-    section = read_asset("changes.html").replace("<!--options-->", "".join(options))
+    content = {"options": "".join(options), "cards": "".join(cards)}
     scenes = [
         make_scene(
             (earlier.models[before], earlier.points[before]), (run.models[after], run.points[after])
         )
         for after, before in pairs
     ]
-    return section.replace("<!--cards-->", "".join(cards)), scenes
+    return fill_page(read_asset(f"{ASSETS}/changes.html"), content), scenes
 
 
 def measure_change(model: BuildingModel) -> float:

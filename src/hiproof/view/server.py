@@ -8,10 +8,10 @@ import json
 import re
 from functools import partial
 from html import escape
-from importlib.resources import files
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
+from ..data_files import fill_page, read_asset
 from ..loopback import HTML, SAFE, Answer, LoopbackHandler, LoopbackServer
 from ..write.colours import page_colours
 
@@ -21,12 +21,12 @@ NO_SOURCE = "'none'"
 CONTENT_TYPES = {".json": "application/json", ".glb": "model/gltf-binary"}
 
 VIEW_ASSETS = {
-    "common": ("hiproof.evaluate", "page.css"),
-    "style": ("hiproof.view", "view.css"),
-    "viewer": ("hiproof.evaluate", "viewer.js"),
-    "tiles": ("hiproof.view", "tiles.js"),
-    "page": ("hiproof.view", "page.js"),
-    "html": ("hiproof.view", "view.html"),
+    "common": "evaluate/assets/page.css",
+    "style": "view/assets/view.css",
+    "viewer": "evaluate/assets/viewer.js",
+    "tiles": "view/assets/tiles.js",
+    "page": "view/assets/page.js",
+    "html": "view/assets/view.html",
 }
 
 
@@ -39,20 +39,14 @@ def make_server(tileset: Path, title: str, port: int = 0) -> LoopbackServer:
 
 def render_page(title: str) -> str:
     """Return the page as text, with its scripts and styles."""
-    texts = {
-        name: (files(package) / "assets" / file).read_text("utf-8")
-        for name, (package, file) in VIEW_ASSETS.items()
-    }
+    texts = {name: read_asset(place) for name, place in VIEW_ASSETS.items()}
     content = {
         "title": escape(title),
         "style": texts["common"] + texts["style"],
         "colours": json.dumps(page_colours()),
         "script": texts["viewer"] + texts["tiles"] + texts["page"],
     }
-    page = texts["html"]
-    for name, text in content.items():
-        page = page.replace(f"<!--{name}-->", text)
-    return page
+    return fill_page(texts["html"], content)
 
 
 def make_policy(page: str) -> str:
