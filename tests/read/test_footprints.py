@@ -279,7 +279,7 @@ def test_footprints_elsewhere_are_refused_with_what_they_look_like(slip):
     shapes = shapely.buffer(shapely.points(in_use), 1e-3)
     footprints = [Footprint(str(i), shape) for i, shape in enumerate(shapes)]
     reach = 1e-5 if np.abs(cloud_xy).max() < 180 else 20.0
-    bounds = (*(cloud_xy.min(axis=0) - reach), *(cloud_xy.max(axis=0) + reach))
+    bounds = np.array([[*(cloud_xy.min(axis=0) - reach), *(cloud_xy.max(axis=0) + reach)]])
     with pytest.raises(InputError, match=expected) as caught:
         check_overlap(footprints, bounds, source, cloud)
     assert str(caught.value).startswith("expected footprints that overlap the cloud in x")
@@ -322,12 +322,12 @@ def test_footprints_in_degrees_that_name_no_crs_are_refused_although_none_has_an
 
 def test_overlap_is_checked_and_both_boxes_are_named():
     footprints = (Footprint("a", SQUARE), Footprint("empty", shapely.Polygon()))
-    check_overlap(footprints, (84990, 445990, 85001, 446001))
-    check_overlap(footprints, [(0, 0, 0, 1, 1, 9), (84990, 445990, -3, 85001, 446001, 9)])
-    check_overlap(footprints[1:], (0, 0, 1, 1))
+    elsewhere, around = (0, 0, 1, 1), (84990, 445990, 85001, 446001)
+    check_overlap(footprints, np.array([elsewhere, around]))
+    check_overlap(footprints[1:], np.array([elsewhere]))
     sentence = r"x 4\.0.* to 5\.0.*RD New.*x 85005\.0 to 85005\.0.*no CRS"
     with pytest.raises(InputError, match=sentence):
-        check_overlap(footprints, (4.0, 51.0, 5.0, 52.0), None, CRS.from_epsg(28992))
+        check_overlap(footprints, np.array([[4.0, 51.0, 5.0, 52.0]]), None, CRS.from_epsg(28992))
 
 
 def bad_file(tmp_path, kind):

@@ -164,16 +164,15 @@ def write_laz(path: Path, clouds: Iterator[Scan], origin: np.ndarray) -> int:
     return count
 
 
-def write_terrain(path: Path, bounds: Box, terrain: Relief, pixel_m: float = 1.0) -> None:
-    """Write terrain heights at the pixel centres as a GeoTIFF."""
+def write_terrain(path: Path, bounds: Box, terrain: Relief) -> None:
+    """Write terrain heights at the centres of pixels of a metre as a GeoTIFF."""
     from ..read.terrain.raster import import_rasterio
 
     rasterio = import_rasterio()
     from rasterio.transform import from_origin
 
     x_low, y_low, x_high, y_high = bounds
-    x = np.arange(x_low + pixel_m / 2, x_high, pixel_m)
-    y = np.arange(y_high - pixel_m / 2, y_low, -pixel_m)
+    x, y = np.arange(x_low + 0.5, x_high), np.arange(y_high - 0.5, y_low, -1.0)
     grid = np.stack(np.meshgrid(x, y), axis=-1)
     heights = np.round(terrain.height_at(grid.reshape(-1, 2)).reshape(grid.shape[:2]), 3).astype(
         np.float32
@@ -189,7 +188,7 @@ def write_terrain(path: Path, bounds: Box, terrain: Relief, pixel_m: float = 1.0
         "height": len(y),
         "width": len(x),
         "crs": CRS,
-        "transform": from_origin(x_low, y_high, pixel_m, pixel_m),
+        "transform": from_origin(x_low, y_high, 1.0, 1.0),
     }
     with rasterio.open(path, "w", **profile, **shape) as file:
         file.write(heights, 1)

@@ -204,7 +204,7 @@ def make_members(
     footprints = read_requested_footprints(request, frame, where=None, bbox=None)
     footprints = leave_out_copies(footprints, request.footprints)
     bounds = frame.units.to_metres(plan_bounds(headers))
-    check_overlap(footprints, bounds.tolist(), frame.footprints, frame.cloud, frame.units)
+    check_overlap(footprints, bounds, frame.footprints, frame.cloud, frame.units)
     old = [member.outline for member in kept]
     registration = register_footprints(
         footprints,

@@ -24,29 +24,24 @@ FOOT_M = 0.3048  # m, by definition
 
 def check_overlap(
     footprints: Sequence[Footprint],
-    bounds: Sequence[float] | Sequence[Sequence[float]],
+    bounds: np.ndarray,
     footprints_crs: CRS | None = None,
     cloud_crs: CRS | None = None,
     units: Units = METRES,
 ) -> None:
     """Raise InputError when no footprint meets the cloud's `bounds`.
 
-    Bounds are of one file or of several. All are in world metres.
-
-    Bounds are (xmin, ymin, xmax, ymax) or, as in a point file's header, (xmin, ymin, zmin, xmax,
-    ymax, zmax). The CRSs are those that the two sides name, `units` those of the CRS they are in;
-    the message says what they look like.
+    These are the boxes (n, 4) of its files, and all are in world metres. The CRSs are those that
+    the two sides name, `units` those of the CRS they are in; the message says what they look like.
     """
     boxes = shapely.bounds(
         [footprint.polygon for footprint in footprints if not footprint.polygon.is_empty]
     )
-    files = np.atleast_2d(np.asarray(bounds, float))
-    files = files[:, [0, 1, 3, 4]] if files.shape[1] == 6 else files
     if not len(boxes) or len(
-        shapely.STRtree(shapely.box(*boxes.T)).query(shapely.box(*files.T))[0]
+        shapely.STRtree(shapely.box(*boxes.T)).query(shapely.box(*bounds.T))[0]
     ):
         return
-    files = units.from_metres(files.reshape(-1, 2)).reshape(-1, 4)
+    files = units.from_metres(bounds)
     moved = units.from_metres((boxes[:, :2] + boxes[:, 2:]) / 2)
     middles = reproject_positions(moved, cloud_crs, footprints_crs)
     guess = next(

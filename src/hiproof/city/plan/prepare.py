@@ -198,7 +198,7 @@ def jobs_from_footprints(
     say_if_columns_run_out(str(request.footprints), footprints)
     bounds = frame.units.to_metres(plan_bounds(headers))
     if len(bounds):
-        check_overlap(footprints, bounds.tolist(), frame.footprints, frame.cloud, frame.units)
+        check_overlap(footprints, bounds, frame.footprints, frame.cloud, frame.units)
     is_part = request.where or request.bbox
     data_set = all_footprints(request, frame, headers) if is_part else footprints
     registration = register_footprints(
