@@ -143,6 +143,20 @@ def test_the_low_part_of_a_roof_cut_out_is_no_ground_under_the_high_one(tmp_path
     assert np.mean(np.abs(gap) < 0.2) > 0.97
 
 
+@pytest.mark.parametrize("density", [2.0, 8.0])
+def test_roofs_of_neighbours_that_were_cut_out_are_no_ground(density, tmp_path):
+    """Houses stood on the lowest points of those around, a fifth as high as they are."""
+    town = make_town(seed=3, density=density)
+    is_roof = town.classification == 6
+    with pytest.warns(InputWarning, match="no building class"):
+        rows = run(tmp_path, town.xyz[is_roof], np.ones(is_roof.sum()), town.footprints)
+    for id, row in rows.items():
+        inside = shapely.contains_xy(town.footprints[id], *town.xyz[:, :2].T) & is_roof
+        lowest = town.xyz[inside, 2].min()
+        assert row["status"] == "modelled" and row["z_ground"] < lowest - 2.5
+        assert "its ground is assumed" in row["detail"]
+
+
 def test_sparse_points_of_a_shed_are_its_roof_where_a_footprint_is_and_none_is_lost_by_that():
     area, n_gained = shapely.box(0, 0, 3.0, 2.7), 0
     for seed in range(20):

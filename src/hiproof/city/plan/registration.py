@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
+import math
 import warnings
 from collections.abc import Callable, Iterator
 from itertools import product
@@ -128,12 +129,13 @@ def warn_if_moved(registration: Registration, path: str) -> None:
     """Warn (InputWarning) where the footprints at `path` are moved, or perhaps should be."""
     (x, y), sigma = registration.xy, max(registration.sigma)
     if is_suspected(registration):
+        lies = f"({-x:.2f}, {-y:.2f}) m with a standard deviation of {sigma:.2f} m"
+        found = f"by {lies}" if math.isfinite(sigma) else "but points fit them nowhere better"
         warn(
             path,
-            f"all footprints may lie beside their roofs, by ({-x:.2f}, {-y:.2f}) m with a standard "
-            f"deviation of {sigma:.2f} m. The {registration.footprints} used show too little to "
-            "tell, so they are not moved all alike; compare them with the cloud, and check the CRS "
-            "of both",
+            f"all footprints may lie beside their roofs, {found}. The {registration.footprints} "
+            "used show too little to tell, so they are not moved all alike; compare them with the "
+            "cloud, and check the CRS of both and the classes of the cloud",
         )
     if registration.is_clear:
         warn(

@@ -48,7 +48,6 @@ CLASSES = dict(zip(POINT_KINDS, (6, 2, 1, 18), strict=True))  # ASPRS classes by
 EXACT_COLUMNS = ("exact_x", "exact_y", "exact_z")
 SCALE_M = 0.001  # Steps (m) of the LAZ coordinates; enough to look at.
 MARGIN_M = 2.0  # Points so far beyond a building's reach complete its outermost ground cells.
-ROOF_REACH_M = 10.0  # Reach of the search for ground between roofs (BESIDE_ALL_M of solve.py).
 
 
 class RecordedTerrain:
@@ -171,7 +170,7 @@ def save_bundle(
 def crop_points(points: dict[str, np.ndarray], plan: WorkPlan, job: Job) -> dict[str, np.ndarray]:
     """Return a tile's points (n, 3), by kind, that the building may see."""
     reaches = {
-        "roof": max(plan.around_m, ROOF_REACH_M),
+        "roof": max(plan.around_m, plan.beyond_m),
         "ground": plan.terrain_reach_m,
         "low": plan.terrain_reach_m,
         "noise": plan.around_m,

@@ -78,9 +78,6 @@ KeepFailure: TypeAlias = Callable[[Job, str, TerrainRecorder | None], None]
 
 DIED = "the process died while it worked on this building"
 
-# m around a building that show whether there is ground between roofs; yards are as wide
-BESIDE_ALL_M = 10.0
-
 
 class Surroundings:
     """All points of a work tile, and its terrain model if there is one.
@@ -93,6 +90,7 @@ class Surroundings:
         self.model = None if model is None else TerrainRecorder(model)
         self.points, self.grid = points, PointGrid(self.roof)
         self.shifts: dict[int, Shift] = {}
+        self.lone: dict[int, bool] = {}
 
     @functools.cached_property
     def settings(self) -> Settings:
@@ -186,7 +184,7 @@ class Surroundings:
         nearby = self.select_points(job, 0.0)
         if read.roofs == "alone":
             return self.add_outer_points(job, find_lone_roof(nearby, job.area))
-        height = nearby[:, 2] - self.ground_to_leave_out(job).height_at(nearby)
+        height = nearby[:, 2] - TerrainChain(self.find_grounds(job)).height_at(nearby)
         found = found_roof(nearby, job.area, height, job.footprint is not None)
         return self.add_outer_points(job, found)
 
@@ -233,22 +231,20 @@ class Surroundings:
             nearby[((nearby[:, :2] >= lower) & (nearby[:, :2] <= upper)).all(axis=1)]
         )
 
-    def ground_to_leave_out(self, job: Job) -> TerrainChain:
-        """Return the ground around the building.
+    def has_roofs_alone(self, job: Job, box: np.ndarray) -> bool:
+        """Return whether all points in a box around a building are of roofs cut out beforehand.
 
-        Among roofs cut out beforehand, whose lowest points are no ground, it is the terrain model's
-        alone.
+        Then their lowest points are no ground. Where roofs are not found by shape, classes tell it.
         """
         from ...classify.cut_out import is_cut_out
 
-        # classes tell it
-        if len(self.ground.inside(neighbourhood(job, self.plan.terrain_reach_m))):
-            return TerrainChain(self.find_grounds(job))
-        surroundings = self.select_points(job, BESIDE_ALL_M)
-        if not (len(surroundings) and is_cut_out(surroundings)):
-            return TerrainChain(self.find_grounds(job))
-        own = neighbourhood(job, 0.0)
-        return TerrainChain([self.model, ModelAround(self.model, own)] if self.model else [])
+        if self.plan.settings.read.roofs != "shape":
+            return False
+        if job.index not in self.lone:
+            points = self.low.inside(box)
+            is_lone = len(points) > 0 and not len(self.ground.inside(box)) and is_cut_out(points)
+            self.lone[job.index] = bool(is_lone)
+        return self.lone[job.index]
 
     def find_grounds(self, job: Job) -> list[Terrain]:
         """Return the terrain model, ground points and ground of a building."""
@@ -275,6 +271,8 @@ class Surroundings:
         Where too few lie beside the building, they are the roof's own, and no cells are returned.
         """
         points = self.low.inside(box)
+        if self.has_roofs_alone(job, box):
+            return Cells(points[:0])
         outline = grow_polygon(shapely.simplify(job.area, COARSEST_THINNING_M), BESIDE_M)
         is_beside = ~shapely.intersects_xy(outline, points[:, :2])
         return self.low if is_beside.sum() >= FEWEST_BESIDE else Cells(points[:0])
