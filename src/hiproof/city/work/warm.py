@@ -1,9 +1,10 @@
 """Compile what runs call before they start, in two processes, so that no two workers do.
 
-    python -m hiproof.city.work.warm fit  # prints the names of functions as they become ready
+    python -m hiproof.city.work.warm roof  # prints the names of functions as they become ready
 
-One process fits a house and a hall, and the other calls what else runs call. They share next to
-nothing. Where they cannot be started, or one fails, functions are compiled when they are called.
+One process draws a roof that was not searched, and the other calls all that runs call, what draws
+roofs at last: by then the first has compiled it. Where they cannot be started, or one fails,
+functions are compiled when they are called.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from ...log import LOGGER
 from ...settings import Settings
 from .cores import cores
 
-HALVES = ("fit", "rest")  # the longer one first
+HALVES = ("roof", "all")
 HALL = shapely.box(0.0, 0.0, 60.0, 6.0)
 
 
@@ -79,7 +80,12 @@ def compile_halves() -> bool:
 
 def compile_half(half: str) -> None:
     """Call what runs call, on houses so small that compiling is all that takes time."""
+    from ...fit.roof import draw_parts
+    from ...fit.shapes.curved import fit_shapes
     from ...fit.union.outline import draw_outline
+    from ...fit.union.plan import lay_out_plan
+    from ...fit.union.search import find_volumes, lay_out_whole
+    from ...fit.union.volumes import make_base
     from ...geometry.point_grid import PointGrid
     from ...method import reconstruct
     from ...simulate import random_compound, uniform_points
@@ -89,19 +95,25 @@ def compile_half(half: str) -> None:
     rng = np.random.default_rng(0)
     house = random_compound(rng, "dormered")
     outline, points = house.footprint, uniform_points(house, rng)
-    if half == "fit":
-        settings = Settings().replace({"reconstruct": {"align": "off"}})
-        reconstruct(points, outline, settings=settings)
-        reconstruct(make_hall(), HALL, settings=settings)
+    settings = Settings().replace({"reconstruct": {"align": "off"}})
+    wholes = []
+    for xyz, polygon in ((points, outline), (make_hall(), HALL)):
+        plan = lay_out_plan(xyz, polygon)
+        wholes.append(lay_out_whole(plan, polygon, settings.compound))
+    if half == "roof":
+        parts, _ = draw_parts(make_base(float(points[:, 2].min())), wholes[0], settings)
+        fit_shapes(parts, points, outline, settings)
         return
+    for whole in wholes:
+        find_volumes(whole, settings.compound)
     PointGrid(points).inside(outline)
-    settings = Settings().replace({"fit": {"parts": "one"}})
-    reconstruct(points, settings=settings)
-    building = reconstruct(
-        points, shapely.transform(outline, lambda xy: xy + 1.0), settings=settings
-    )
-    fragments(building, ("a", "a"), FileHead(offset=np.zeros(3)))
+    one = Settings().replace({"fit": {"parts": "one"}})
+    reconstruct(points, settings=one)
+    moved = shapely.transform(outline, lambda xy: xy + 1.0)
+    fragments(reconstruct(points, moved, settings=one), ("a", "a"), FileHead(offset=np.zeros(3)))
     draw_outline(points)
+    reconstruct(points, outline, settings=settings)
+    reconstruct(make_hall(), HALL, settings=settings)
 
 
 def make_hall() -> np.ndarray:

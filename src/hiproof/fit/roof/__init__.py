@@ -32,7 +32,7 @@ from ...model import Part, Piece, as_xyz
 from ...primitives.catalogue import CATALOGUE, CURVED
 from ...primitives.family import name_among
 from ...read.plausible import is_plausible
-from ...settings import CompoundSettings, Settings
+from ...settings import Settings
 from ..prices import compute_unit
 from ..shapes.curved import fit_shapes
 from ..shapes.regions import exclude_parts, list_polygons
@@ -94,7 +94,7 @@ def fit_building(
     types = settings.fit.types
     whole = lay_out_whole(plan, outline, settings.compound, types)
     xy = plan.frame.xy_local(np.column_stack(place_nodes(whole.scene, VISIBLE_DEPTH_M)))
-    drawn, price = draw_parts(whole, settings)
+    drawn, price = draw_parts(find_volumes(whole, settings.compound), whole, settings)
     visible = keep_visible(drawn, xy)
     has_teeth = not types or "shed" in types
     parts = unite_saw_teeth(visible) if has_teeth else visible
@@ -106,26 +106,26 @@ def fit_building(
     return BuildingFit(tuple(parts), outline, price, whole.scene.n, unexplained)
 
 
-def draw_parts(whole: Whole, settings: Settings) -> tuple[list[Part], float]:
-    """Draw the search's volumes, improve them until no move saves, and name them as parts.
+def draw_parts(volumes: np.ndarray, whole: Whole, settings: Settings) -> tuple[list[Part], float]:
+    """Draw the search's volumes (k, COLUMNS), improve them until no move saves, and name them.
 
-    Also returns the price (points) of the drawn roof.
+    Returns the parts, and the price (points) of the drawn roof.
     """
     plan, types = whole.plan, settings.fit.types
     unit = compute_unit(plan.density, settings.compound)
     keeps_shapes = bool(types) and not {*CATALOGUE} <= {*types, *CURVED}
     site = make_site(whole.scene, whole.outline, unit, plan.border, keeps_shapes)
-    roof, price = find_roof(whole, site, settings.compound)
+    roof, price = find_roof(volumes, whole, site)
     return read_parts(roof, site, whole.outline, plan, types), price
 
 
-def find_roof(whole: Whole, site: Site, settings: CompoundSettings) -> tuple[Tables, float]:
+def find_roof(volumes: np.ndarray, whole: Whole, site: Site) -> tuple[Tables, float]:
     """Find a roof that no move makes cheaper, and its price (points).
 
-    Volumes are added where points are unexplained, if the search has not seen all of them.
-    `settings` are those of [compound].
+    It begins with volumes (k, COLUMNS). More are added where points are unexplained, if the search
+    has not seen all of them.
     """
-    roof = start_roof(find_volumes(whole, settings), whole.scene.turn, site)
+    roof = start_roof(volumes, whole.scene.turn, site)
     trial, drawing = make_tables_like(roof), make_drawing(len(roof.sides))
     price = improve(roof, trial, site, drawing, np.ones(len(roof.sides), np.bool_), LOOP_ROUNDS)
     is_thinned = whole.scene.n > SEARCH_POINTS  # else the search has seen every point
