@@ -98,12 +98,25 @@ def end_at_others(
             shown = unite([area for j, q in others for area in draw_lowest(roof, j, q, regions[j])])
             own = draw_lowest(roof, k, p, regions[k])
             if own and subtract(unite_fragments(drawing, seen.tolist()), shown).area <= FRAGMENT_M2:
-                regions[k] = list_polygons(subtract(unite(regions[k]), unite(own)))
+                other = np.flatnonzero((owners[:, 0] == k) & (owners[:, 1] != p)).tolist()
+                visible = unite_fragments(drawing, other)
+                regions[k] = cut_square(unite(regions[k]), unite(own), roof.planes[k, p], visible)
                 planes[k].remove(p)
                 ended.add(k)
                 if len(seen):
                     owners[seen] = others[0]
     return ended
+
+
+def cut_square(
+    region: shapely.Geometry, end: shapely.Geometry, plane: np.ndarray, visible: shapely.Geometry
+) -> list[shapely.Polygon]:
+    """Return a region without its `end`, cut square to the plane there if that hides nothing."""
+    rise = plane[:2]
+    place = float((shapely.get_coordinates(end) @ rise).max())
+    cut_off = intersect(region, draw_convex(np.array([[*rise, -place]])))
+    is_hidden = subtract(visible, cut_off).area <= FRAGMENT_M2
+    return list_polygons(cut_off if is_hidden else subtract(region, end))
 
 
 def draw_lowest(
