@@ -13,6 +13,7 @@ import gc
 import os
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import numba
@@ -107,7 +108,8 @@ def compile_half(half: str) -> None:
     for whole in wholes:
         find_volumes(whole, settings.compound)
     PointGrid(points).inside(outline)
-    one = Settings().replace({"fit": {"parts": "one"}})
+    network = "auto" if find_spec("onnxruntime") else "never"
+    one = Settings().replace({"fit": {"parts": "one"}, "segment": {"network": network}})
     reconstruct(points, settings=one)
     moved = shapely.transform(outline, lambda xy: xy + 1.0)
     fragments(reconstruct(points, moved, settings=one), ("a", "a"), FileHead(offset=np.zeros(3)))
