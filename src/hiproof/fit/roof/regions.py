@@ -90,11 +90,12 @@ def end_at_others(
     for k in range(len(regions)):
         for p in reversed(planes[k]):
             seen = np.flatnonzero((owners == (k, p)).all(axis=1))
-            is_of_side = abs(roof.plane_lines[k, p]) in np.abs(roof.sides[k])
-            if len(planes[k]) == (1 if len(seen) else 2) or (len(seen) and is_of_side):
-                continue
             same = np.argwhere(drawing.numbers[: len(regions)] == drawing.numbers[k, p])
             others = [(j, q) for j, q in same.tolist() if j != k and q in planes[j]]
+            is_of_side = abs(roof.plane_lines[k, p]) in np.abs(roof.sides[k])
+            may_end = others and not is_of_side if len(seen) else len(planes[k]) > 2
+            if not may_end or len(planes[k]) == 1:
+                continue
             shown = unite([area for j, q in others for area in draw_lowest(roof, j, q, regions[j])])
             own = draw_lowest(roof, k, p, regions[k])
             if own and subtract(unite_fragments(drawing, seen.tolist()), shown).area <= FRAGMENT_M2:
