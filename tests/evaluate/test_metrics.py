@@ -64,7 +64,7 @@ def test_points_beyond_the_roof_are_misses():
     points = np.concatenate([roof_points(), annex])
     figures = quality(block(), points, shapely.box(0, 0, 12, 6))
     assert figures.share_within_20cm == pytest.approx(190 / 210)
-    assert psd(block(), points)[-1] == 1
+    assert psd(block(), points)[-1] == pytest.approx(1)
 
 
 def test_facade_points_do_not_count_for_the_share():
@@ -212,6 +212,15 @@ def test_equals_the_slow_oracle(seed):
     points = rng.normal(size=(40, 3)) * 4
     expected = [min(slow_distance(p, rings) for rings in polygons) for p in points]
     np.testing.assert_allclose(point_surface_distances(points, polygons), expected, atol=1e-9)
+
+
+def test_distances_beyond_a_limit_are_the_limit():
+    rng = np.random.default_rng(20)
+    polygons, points = [random_polygon(rng) for _ in range(3)], rng.normal(size=(40, 3)) * 4
+    limit = rng.uniform(0, 2, len(points))
+    expected = np.minimum(point_surface_distances(points, polygons), limit)
+    assert 0 < np.count_nonzero(expected == limit) < len(points)
+    np.testing.assert_allclose(point_surface_distances(points, polygons, limit), expected)
 
 
 def test_a_hole_is_outside():

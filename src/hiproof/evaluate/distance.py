@@ -1,8 +1,8 @@
 """Exact distances from points to bounded planar polygons, on which all residual figures build.
 
 The distance of a point to a polygon follows from that to its plane and, in the plane, that of the
-foot of the perpendicular to the polygon. The plane distance bounds it from below, so points are
-passed over whose plane distance is no less than the best so far.
+foot of the perpendicular to the polygon, by GEOS. The plane distance bounds it from below, so
+points are passed over whose plane distance is no less than the best so far.
 """
 
 from __future__ import annotations
@@ -14,39 +14,39 @@ import shapely
 
 from ..errors import InputError
 from ..geometry.point_in_polygon import find_inside
-from ..geometry.rings import ring_normal
 from ..model import as_xyz
 
 # (m, 3) vertices without the closing one; a polygon is a ring or a sequence of rings, the outer
 # first, holes after.
 Ring = np.ndarray
 
-LEAST_AREA_M2 = 1e-12  # A polygon with less area counts as its edges.
 UPRIGHT = 1e-6  # The upward part of the normal of a polygon that is upright.
 
 
 def point_surface_distances(
-    points: np.ndarray, polygons: Sequence[Ring | Sequence[Ring]]
+    points: np.ndarray,
+    polygons: Sequence[Ring | Sequence[Ring]],
+    at_most: np.ndarray | float = np.inf,
 ) -> np.ndarray:
     """Return the distance (n,) in metres of `points` (n, 3) to the polygons.
 
-    It is that to the nearest of the bounded `polygons`, all in one frame. inf without polygons.
-    Raises InputError for arrays of another shape.
+    It is that to the nearest of the bounded `polygons`, all in one frame, and `at_most` (m, one
+    for all or each) where they are farther, or there are none. Raises InputError for arrays of
+    another shape.
 
     >>> square = np.array([[0.0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]])
     >>> point_surface_distances(np.array([[1.0, 1, 3], [5, 1, 4]]), [square]).tolist()
     [3.0, 5.0]
     """
     points = as_xyz(points)
-    nearest = np.full(len(points), np.inf)
-    for rings, normal in list_faces(polygons):
-        height = (points - rings[0][0]) @ normal
-        near = np.flatnonzero(np.abs(height) < nearest)
-        feet = points[near] - height[near, None] * normal
-        inside = find_over(rings, int(np.abs(normal).argmax()), feet)
-        nearest[near[inside]] = np.abs(height[near[inside]])
-        beside = np.delete(near, inside)
-        nearest[beside] = np.minimum(nearest[beside], measure_edges(points[beside], rings))
+    nearest = np.broadcast_to(at_most, len(points)).astype(float)
+    for rings, axes in list_faces(polygons):
+        corner = rings[0][0]
+        flat = (points - corner) @ axes.T
+        near = np.flatnonzero(np.abs(flat[:, 2]) < nearest)
+        polygon = make_polygon([(ring - corner) @ axes.T for ring in rings])
+        beside = shapely.distance(polygon, shapely.points(flat[near, :2]))
+        nearest[near] = np.minimum(nearest[near], np.hypot(beside, flat[near, 2]))
     return nearest
 
 
@@ -61,37 +61,25 @@ def vertical_distances(points: np.ndarray, polygons: Sequence[Ring | Sequence[Ri
     """
     points = as_xyz(points)
     nearest = np.full(len(points), np.inf)
-    for rings, normal in list_faces(polygons):
-        if abs(normal[2]) < UPRIGHT:
+    for rings, axes in list_faces(polygons):
+        if abs(axes[2, 2]) < UPRIGHT:
             continue
-        over = find_over(rings, 2, points)
-        gap = np.abs((points[over] - rings[0][0]) @ normal / normal[2])
+        over = np.flatnonzero(find_inside(make_polygon(rings), points[:, 0], points[:, 1]))
+        gap = np.abs((points[over] - rings[0][0]) @ axes[2] / axes[2, 2])
         nearest[over] = np.minimum(nearest[over], gap)
     return nearest
 
 
-def find_over(rings: list[Ring], axis: int, points: np.ndarray) -> np.ndarray:
-    """Return which of `points` (n, 3) the rings hold, seen along an axis."""
-    outer, *holes = (np.delete(ring, axis, axis=1) for ring in rings)
-    return np.flatnonzero(
-        find_inside(shapely.Polygon(outer, holes), *np.delete(points, axis, axis=1).T)
-    )
-
-
-def measure_edges(points: np.ndarray, rings: list[Ring]) -> np.ndarray:
-    """Return the distances (n,) of points (n, 3) to the nearest edge of the rings."""
-    start = np.concatenate(rings)
-    along = np.concatenate([np.roll(ring, -1, axis=0) for ring in rings]) - start
-    length2 = np.maximum((along**2).sum(axis=1), np.finfo(float).tiny)
-    off = points[:, None] - start
-    share = np.clip(np.einsum("nmk,mk->nm", off, along) / length2, 0.0, 1.0)
-    return np.linalg.norm(off - share[:, :, None] * along, axis=2).min(axis=1)
+def make_polygon(rings: list[Ring]) -> shapely.Polygon:
+    """Make a polygon of the first two coordinates of rings, the outer one first."""
+    outer, *holes = (ring[:, :2] for ring in rings)
+    return shapely.Polygon(outer, holes)
 
 
 def list_faces(
     polygons: Sequence[Ring | Sequence[Ring]],
 ) -> Iterator[tuple[list[Ring], np.ndarray]]:
-    """Yield the rings of each polygon and its unit normal (3,), zero without area.
+    """Yield the rings of each polygon and its axes (3, 3), of which the last is its normal.
 
     Raises InputError for arrays of another shape.
     """
@@ -103,6 +91,4 @@ def list_faces(
                 raise InputError(
                     f"expected rings of shape (m, 3) with at least 3 vertices, got {ring.shape}"
                 )
-        normal = ring_normal(rings[0])
-        length = np.linalg.norm(normal)
-        yield rings, normal / length if length >= LEAST_AREA_M2 else np.zeros(3)
+        yield rings, np.linalg.svd(rings[0] - rings[0][0], full_matrices=False)[2]

@@ -114,8 +114,8 @@ def quality(
         figures["nodata_share"] = nodata_share(points, outline)
     if len(points) and polygons:
         inner = inner or well_inside(points, plan_outline(polygons) if outline is None else outline)
-        distances = point_surface_distances(points, polygons)
         dz = vertical_distances(points, polygons)
+        distances = point_surface_distances(points, polygons, at_most=dz)
         figures |= {
             "psd_mean": float(distances.mean()),
             "psd_std": float(distances.std()),

@@ -196,7 +196,9 @@ def collect_evidence(model: Model, points: np.ndarray, unused: np.ndarray) -> Ev
     dz = everything[:, 2] - np.maximum(z_roof, floor)  # where no part is the model shows ground
     on_roof = np.abs(dz) < NEAR_M
     is_off = ~on_roof
-    is_off[is_off] = point_surface_distances(everything[is_off], wall_rings(model)) >= FACADE_M
+    is_off[is_off] = (
+        point_surface_distances(everything[is_off], wall_rings(model), at_most=FACADE_M) >= FACADE_M
+    )
     counts, area_m2 = on_roof | is_off, roof.outline.area
     mask = np.arange(len(everything)) < len(points)
     roof_points = points[counts[mask]]
