@@ -3,7 +3,6 @@
 single         `fit_roof`: one primitive by all points, the door to both objectives
 likelihood     the default objective: starts, annealing, the choice of type, what is known of the
                result
-regular        what `shapes` fits by the likelihood: round shapes, with their covariance
 direction      plan directions before any fit
 walls          which points lie on walls
 tables         the catalogue as arrays
