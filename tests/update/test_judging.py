@@ -134,6 +134,46 @@ def test_bare_ground_inside_the_outline_makes_a_building_gone(rng):
     assert judge((roof, old), ground[:0]).change is Change.NOT_COVERED
 
 
+def make_small_house(rng):
+    """Return a roof of 20 to 40 m2, turned at random."""
+    kind, width = str(rng.choice(["flat", "gable", "monopitch"])), rng.uniform(3.5, 4.4)
+    parameters = {"length": rng.uniform(20, 40) / width, "width": width}
+    parameters |= {} if kind == "flat" else {"height": rng.uniform(0.5, 2.0)}
+    place = np.array([0.0, 0.0, rng.uniform(2.5, 6.0)])
+    part = make_part(kind, parameters, rng.uniform(0, np.pi), place)
+    return assemble((part,), "single", (0.0, 0.0, 0.0)).roof
+
+
+def lose_side(rng, roof, least_m2):
+    """Return a side of a roof that lies bare, in a direction that the cells do not know."""
+    while True:
+        angle = rng.uniform(0, 2 * np.pi)
+        out, along = np.array([(np.cos(angle), np.sin(angle)), (-np.sin(angle), np.cos(angle))])
+        reach = shapely.get_coordinates(roof.outline) @ out
+        start = reach.min() + np.ptp(reach) * rng.uniform(0.45, 0.9)
+        corners = [start * out - 20 * along, start * out + 20 * along]
+        side = shapely.Polygon([*corners, corners[1] + 20 * out, corners[0] + 20 * out])
+        if roof.outline.intersection(side).area > least_m2:
+            return side
+
+
+@pytest.mark.parametrize("seed", [41, 42, 43])
+@pytest.mark.parametrize("density", [4.0, 8.0, 16.0])
+def test_a_small_house_that_lost_a_side_is_never_unchanged(density, seed):
+    """A corner of 3 m2 off a house of 27 m2 was: half of it lies along walls, aslant to cells."""
+    rng, lost, untouched = np.random.default_rng(seed), [], []
+    for _ in range(40):
+        roof = make_small_house(rng)
+        old, new = scan(rng, roof, density), scan(rng, roof, density)
+        aside = [*rng.normal(0, 0.03, 2), 0]
+        untouched.append(judge((roof, old), new + aside).change)
+        bare = let_pass(rng, new, 1.0, lose_side(rng, roof, 4.0))
+        lost.append(judge((roof, old), bare + aside).change)
+    assert lost.count(Change.UNCHANGED) <= (1 if density < 8 else 0)
+    assert sum(change in (Change.CHANGED, Change.GONE) for change in lost) >= 32
+    assert set(untouched) == {Change.UNCHANGED}
+
+
 def let_pass(rng, points, share, inside=None):
     """Let a share of the pulses through to the ground, in all of a roof or `inside` a polygon."""
     passes = rng.random(len(points)) < share

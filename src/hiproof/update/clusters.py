@@ -85,14 +85,16 @@ def find_clusters(comparison: CellComparison, stray: float = CELL_CHANCE) -> lis
     return sorted(result, key=lambda cluster: (-len(cluster.members), cluster.members[0]))
 
 
-def group_cells(comparison: CellComparison, is_chosen: np.ndarray) -> Iterator[np.ndarray]:
-    """Yield the members of each group of chosen cells (k,) side by side.
+def group_cells(
+    comparison: CellComparison, is_chosen: np.ndarray, beside: np.ndarray = KEY_OF_CELL
+) -> Iterator[np.ndarray]:
+    """Yield the members of each group of chosen cells (k,) that lie `beside` each other.
 
     Cells that one survey left empty by chance do not part a group.
     """
     keys = comparison.cells.astype(np.int64) @ KEY_OF_CELL
     linked = np.flatnonzero(is_chosen | ~comparison.is_compared)
-    labels = label_components(len(linked), link_neighbours(keys[linked]))
+    labels = label_components(len(linked), link_neighbours(keys[linked], beside))
     for label in np.unique(labels[is_chosen[linked]]):
         members = linked[labels == label]
         yield members[is_chosen[members]]
@@ -151,9 +153,12 @@ def is_known_around(comparison: CellComparison, members: np.ndarray) -> np.ndarr
     return result
 
 
-def link_neighbours(keys: np.ndarray) -> np.ndarray:
-    """Return the pairs (2, p) of cells that share a side, by their numbers `keys` (k,)."""
-    pairs = [np.intersect1d(keys + side, keys, return_indices=True)[1:] for side in KEY_OF_CELL]
+def link_neighbours(keys: np.ndarray, beside: np.ndarray = KEY_OF_CELL) -> np.ndarray:
+    """Return the pairs (2, p) of cells by their numbers `keys` (k,), of which one is `beside`.
+
+    They share a side, with AROUND_KEYS a side or a corner.
+    """
+    pairs = [np.intersect1d(keys + side, keys, return_indices=True)[1:] for side in beside]
     return np.hstack(pairs)
 
 

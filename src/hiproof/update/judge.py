@@ -7,7 +7,9 @@ taking its place, such as leaves or a crane, makes a building uncertain at most.
 
 from __future__ import annotations
 
+import dataclasses
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,8 +17,19 @@ import numpy as np
 from ..geometry.grid import AROUND_KEYS, KEY_OF_CELL
 from ..model import Roof
 from ..status import Change
-from .cells import CellComparison, compare_points, predict_occupancy
-from .clusters import KEPT_SHARE, ChangedCells, find_clusters, group_cells, measure_roof
+from .cells import CellComparison, compare_points, predict_occupancy, summarise_cells
+from .clusters import (
+    FARTHEST_SIGMAS,
+    KEPT_SHARE,
+    ChangedCells,
+    compute_chance,
+    describe_cluster,
+    find_clusters,
+    group_cells,
+    is_known_around,
+    measure_area,
+    measure_roof,
+)
 from .ground import Ground
 from .register import SurveyShift
 
@@ -40,8 +53,13 @@ PASSED_SHARE, FEWEST_LEFT = 0.03, 3
 """Share, and number, of the new points over bare ground that still lie on the earlier roof, from
 which on pulses pass it, as glass lets most of them. Under a roof that is gone hardly one does."""
 
-SMALLEST_M2 = 2.0
-"""Area (m2) below which a cluster is a chimney, an aerial or the edge of something."""
+SMALLEST_M2, SMALLEST_BARE_M2 = 2.0, 1.0
+"""Area (m2) below which a cluster is a chimney, an aerial or the edge of something. Nothing else
+looks like bare ground, and half of a small place lies along walls, where cells do not count."""
+
+FEWEST_BARE = 3
+"""Points on the ground from which on they make a building uncertain though they fill no cells. One
+or two are echoes that came on a detour."""
 
 SMALL_M2 = 12.0
 """Area (m2) below which an addition is a dormer or the like, and what is left of a building is
@@ -89,8 +107,11 @@ def judge_building(
     is_bare = is_gone(comparison, was_roof, on_ground) and not is_passed
     if is_bare and measure_standing(comparison, roof, ground) < SMALL_M2:
         return ChangeVerdict(Change.GONE, comparison, ground, 0.0)
-    found = [c for c in find_clusters(comparison, shift.noise.stray) if c.area_m2 >= SMALLEST_M2]
-    likely = [c for c in found if c.chance < significance]
+    likely = [
+        c
+        for c in find_clusters(comparison, shift.noise.stray)
+        if c.chance < significance and is_large(c, comparison, ground)
+    ]
     beyond = unexplained_m2 if old is None else 0.0
     clear = tuple(
         c
@@ -103,7 +124,13 @@ def judge_building(
     chance = min([whole_chance, *(c.chance for c in clear)])
     if clear or chance < significance:
         return ChangeVerdict(Change.CHANGED, comparison, ground, chance, clear)
-    doubtful = tuple(c for c in likely if c.area_m2 >= DOUBTFUL_M2)
+    doubtful = tuple(c for c in likely if c.area_m2 >= DOUBTFUL_M2) or tuple(
+        c
+        for c in find_bare_points(comparison, roof, ground, shift.noise.stray)
+        if c.chance < significance
+        and c.area_m2 > max(beyond, SMALLEST_BARE_M2)
+        and not passes_pulses(comparison, was_roof, on_ground, c.members)
+    )
     if doubtful:
         return ChangeVerdict(Change.UNCERTAIN, comparison, ground, doubtful[0].chance, doubtful)
     return ChangeVerdict(Change.UNCHANGED, comparison, ground)
@@ -174,6 +201,38 @@ def passes_pulses(
     inner = selection[~np.isin(keys[selection, None] + AROUND_KEYS, standing).any(axis=1)]
     kept = float(c.kept[inner] @ c.n_new[inner])
     return kept >= max(FEWEST_LEFT, PASSED_SHARE * float(c.n_new[inner].sum()))
+
+
+def find_bare_points(
+    comparison: CellComparison, roof: Roof, ground: Ground, stray: float
+) -> Iterator[ChangedCells]:
+    """Yield places with new points on the ground where the earlier survey shows roof alone.
+
+    They count where they share cells with points of a roof, too, or with no earlier ones.
+    """
+    c = comparison
+    heights = c.points[:, 2] - ground.height_at(c.points)
+    low = np.flatnonzero((heights < OVER_GROUND_M) & (heights - c.over > 2 * OVER_GROUND_M))
+    number, over = c.number[low], c.over[low]
+    if len(low) < FEWEST_BARE:
+        return
+    new, _, n_low = summarise_cells(number, over, len(c.cells), 0.0)
+    sigma = np.minimum(c.sigma, c.sigma[c.is_compared].max())
+    bare = dataclasses.replace(c, old=np.nan_to_num(c.old), new=new, sigma=sigma)
+    is_other = n_low > 0
+    is_other[is_other] = ~is_known_around(bare, np.flatnonzero(is_other))
+    for members in group_cells(c, is_other, AROUND_KEYS):
+        inside = number[np.isin(number, members)]
+        chance = compute_chance(len(inside), FARTHEST_SIGMAS, len(c.points), stray)
+        if len(inside) >= FEWEST_BARE:
+            place = describe_cluster(bare, members, len(members))
+            yield dataclasses.replace(place, area_m2=measure_area(c, inside), chance=chance)
+
+
+def is_large(cluster: ChangedCells, comparison: CellComparison, ground: Ground) -> bool:
+    """Return whether a cluster is larger than a chimney, or bare ground."""
+    is_bare = cluster.area_m2 >= SMALLEST_BARE_M2 and lies_bare(cluster, comparison, ground)
+    return is_bare or cluster.area_m2 >= SMALLEST_M2
 
 
 def lies_bare(cluster: ChangedCells, comparison: CellComparison, ground: Ground) -> bool:

@@ -157,7 +157,10 @@ class LostParts:
             return None
         is_bare = np.logical_and(*find_bare(c, earlier, verdict.ground))
         bare = np.intersect1d(np.concatenate(changed), np.flatnonzero(is_bare))
-        area_m2 = len(bare) * c.cell_m2
+        area_m2 = sum(
+            cluster.area_m2 * float(np.isin(cluster.members, bare).mean())
+            for cluster in verdict.clusters
+        )
         if area_m2 < LEAST_BARE_M2:
             return None
         is_low = c.points[:, 2] - verdict.ground.height_at(c.points) < OVER_GROUND_M
