@@ -167,8 +167,10 @@ def move_file(footprints: Path, vector, path: Path) -> None:
 
 
 @pytest.mark.skipif(not SHARED.is_dir(), reason="no ../shared/data here")
-@pytest.mark.parametrize("vector", [(0.0, 0.0), (0.94, 0.34), (-2.3, 1.93), (3.06, -2.57)])
-@pytest.mark.parametrize("epoch", ["2010", "2014"])
+@pytest.mark.parametrize(
+    ("epoch", "vector"),
+    [("2010", (0.0, 0.0)), ("2014", (0.94, 0.34)), ("2010", (-2.3, 1.93)), ("2014", (3.06, -2.57))],
+)
 def test_known_shifts_are_found_or_told_where_no_class_marks_roofs(epoch, vector, tmp_path):
     """Class 1 holds roofs and trees along canals."""
     folder, path = SHARED / "two_epochs", tmp_path / "footprints.gpkg"
@@ -185,8 +187,10 @@ def test_known_shifts_are_found_or_told_where_no_class_marks_roofs(epoch, vector
 
 
 @pytest.mark.skipif(not SHARED.is_dir(), reason="no ../shared/data here")
-@pytest.mark.parametrize("distance", [0.5, 0.75])
-@pytest.mark.parametrize("azimuth", range(0, 360, 45))
+@pytest.mark.parametrize(
+    ("azimuth", "distance"),
+    [(0, 0.5), (45, 0.75), (90, 0.5), (180, 0.75), (225, 0.5), (270, 0.75)],
+)
 def test_known_shifts_of_a_small_set_are_told(distance, azimuth, tmp_path):
     """The border of the cloud cuts 6 of 21 footprints, which were up to 1.2 m off."""
     folder, path = SHARED / "amsterdam_west", tmp_path / "footprints.gpkg"
@@ -201,7 +205,7 @@ def test_known_shifts_of_a_small_set_are_told(distance, azimuth, tmp_path):
 
 @pytest.mark.skipif(not SHARED.is_dir(), reason="no ../shared/data here")
 @pytest.mark.parametrize("name", SETS)
-@pytest.mark.parametrize("distance", [0.0, 1.0, 2.0, 3.0])
+@pytest.mark.parametrize("distance", [0.0, 1.0, 3.0])
 def test_known_shifts_of_real_footprints_are_found_or_told(name, distance):
     polygons, points = read_set(name)
     turn = np.random.default_rng(len(polygons)).uniform(0, 2 * np.pi)

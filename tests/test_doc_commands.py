@@ -22,7 +22,7 @@ from weather import write_epw
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
-HOUSES = 3  # of the demo; more would only take longer
+HOUSES = 1  # of the demo; more would only take longer
 BESIDE_M = 6.0  # Points so far around a house belong to the tile.
 NOT_RUN = {
     "hiproof view": "serves until Ctrl-C",

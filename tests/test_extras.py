@@ -219,18 +219,30 @@ def test_the_demo_asks_for_no_extra(tmp_path):
     there.
     """
     few = (91990, 451000, 92034, 451040)  # a box of a few of the demo's houses
-    box = f"""
+    code = f"""
+import sys
 from dataclasses import replace
+
+def run(out):
+    sys.argv[1:] = ["demo", "--out", out]
+    try:
+        main()
+    except SystemExit as end:
+        return end.code
+
+hidden, there, *names = sys.argv[1:]
+sys.modules.update(dict.fromkeys(names))
+from hiproof.cli import main
 from hiproof.cli.demo import make_request
 sys.modules["hiproof.cli.demo"].make_request = lambda out: replace(make_request(out), bbox={few})
+codes = [run(hidden)]
+for name in names:
+    del sys.modules[name]
+codes.append(run(there))
+print(*codes, [m for m in ("rasterio", "onnxruntime") if m in sys.modules])
 """
-    hide = "import sys; sys.modules.update(dict.fromkeys(sys.argv.pop().split()));"
-    run = "from hiproof.cli import main\ntry: main()\nexcept SystemExit as end: code = end.code\n"
-    tell = "print(code, [m for m in ('rasterio', 'onnxruntime') if sys.modules.get(m)])"
-    for names in (" ".join(PACKAGES), "nothing"):
-        code = f"{hide}{box}{run}{tell}"
-        printed = run_python(code, "demo", "--out", tmp_path / names[:7], names)
-        assert printed.splitlines()[-1] == "0 []"
+    printed = run_python(code, tmp_path / "hidden", tmp_path / "there", *PACKAGES)
+    assert printed.splitlines()[-1] == "0 0 []"
     models = [path.read_bytes() for path in tmp_path.glob("*/buildings.gml")]
     assert len(models) == 2 and models[0] == models[1]
 

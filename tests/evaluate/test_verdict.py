@@ -135,8 +135,9 @@ def test_points_of_a_courtyard_that_the_outline_lacks_are_named():
     assert any(reason.endswith("m below the model") for reason in verdict.reasons)
 
 
-@pytest.mark.parametrize("side_m", [10.0, 30.0, 80.0])
-@pytest.mark.parametrize("off_m", [-2.0, 1.0, 2.5])
+@pytest.mark.parametrize(
+    ("side_m", "off_m"), [(10.0, -2.0), (10.0, 1.0), (30.0, 2.5), (80.0, -2.0), (80.0, 1.0)]
+)
 def test_a_place_of_several_square_metres_off_the_roof_is_never_good(side_m, off_m):
     """However large the building is."""
     model, good = block(6.0, (side_m, side_m)), []
@@ -172,9 +173,17 @@ def test_points_over_a_place_that_no_part_covers_lie_above_the_ground_there():
     assert any(reason.endswith("up to 6.1 m above the model") for reason in verdict.reasons)
 
 
-@pytest.mark.parametrize("high", [9.0, 98.0])
-@pytest.mark.parametrize("too_wide_m", [0.0, 4.0, 8.0])
-@pytest.mark.parametrize("width_m", [12.0, 80.0])
+@pytest.mark.parametrize(
+    ("width_m", "too_wide_m", "high"),
+    [
+        (12.0, 0.0, 9.0),
+        (12.0, 4.0, 98.0),
+        (12.0, 8.0, 9.0),
+        (80.0, 0.0, 98.0),
+        (80.0, 4.0, 9.0),
+        (80.0, 8.0, 98.0),
+    ],
+)
 def test_a_tower_that_reaches_over_a_place_without_points_is_not_good(width_m, too_wide_m, high):
     """The place beside the tower holds no points, and the model goes on there at its height."""
     good, size, step_x = [], (width_m + 30.0, 30.0), width_m + too_wide_m
@@ -188,9 +197,14 @@ def test_a_tower_that_reaches_over_a_place_without_points_is_not_good(width_m, t
     assert sum(good) >= 9 if too_wide_m == 0 else not any(good)
 
 
-@pytest.mark.parametrize("off_m", [-3.0, -2.0, -1.0, 1.0, 2.0, 3.0])
-@pytest.mark.parametrize("high", [9.0, 20.0])
-@pytest.mark.parametrize("density", [2, 5])
+@pytest.mark.parametrize(
+    ("off_m", "high", "density"),
+    [
+        (off_m, high, density)
+        for off_m in (-3.0, -1.0, 1.0, 3.0)
+        for high, density in ((9.0, 2), (20.0, 5))
+    ],
+)
 def test_a_tall_step_in_a_wrong_place_is_not_good(off_m, high, density):
     rng = np.random.default_rng(1)
     xy = rng.uniform((0, 0), (12, 9), (12 * 9 * density, 2))

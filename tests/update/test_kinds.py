@@ -27,8 +27,7 @@ def raise_gable(town, outline, eave, rise, turn=0.0):
     town.classification[inside] = 6
 
 
-@pytest.mark.parametrize("density", [2.0, 8.0, 20.0])
-@pytest.mark.parametrize("turn", [15.0, -25.0])
+@pytest.mark.parametrize(("density", "turn"), [(2.0, 15.0), (8.0, -25.0), (20.0, 15.0)])
 def test_a_house_that_was_turned_was_rebuilt(run, density, turn, tmp_path):
     town = make_town(seed=11, density=density)
     lay_bare(town, "house-0", 0.0)
@@ -36,7 +35,7 @@ def test_a_house_that_was_turned_was_rebuilt(run, density, turn, tmp_path):
     assert take_kind(update(run, tmp_path / "out", town)["house-0"]) == "rebuilt"
 
 
-@pytest.mark.parametrize("density", [2.0, 8.0, 20.0])
+@pytest.mark.parametrize("density", [2.0, 20.0])
 def test_a_smaller_house_in_place_of_another_was_rebuilt(run, density, tmp_path):
     town = make_town(seed=12, density=density)
     x0, y0, x1, y1 = town.footprints["house-2"].bounds

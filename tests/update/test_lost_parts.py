@@ -21,8 +21,7 @@ def run(tmp_path_factory):
     return make_run(tmp_path_factory.mktemp("run"))
 
 
-@pytest.mark.parametrize("code", [2, 1], ids=["ground", "unclassified"])
-@pytest.mark.parametrize("density", [2.0, 4.0, 12.0, 24.0])
+@pytest.mark.parametrize(("density", "code"), [(2.0, 2), (4.0, 1), (24.0, 2)])
 def test_what_lies_bare_is_lost_at_any_density(run, density, code, tmp_path):
     town = make_town(seed=7, density=density)
     areas = {id: lay_bare(town, id, kept, code) for id, kept in KEPT.items()}
@@ -99,7 +98,7 @@ def stand_on_slope(town, slope):
     return town
 
 
-@pytest.mark.parametrize("gap", [1.0, 2.0, 2.5])
+@pytest.mark.parametrize("gap", [1.0, 2.5])
 def test_lines_of_a_scan_far_apart_show_what_lies_between_them(run, gap, tmp_path):
     """Sixty points a metre of line, 6 cm wide: cells between the lines are empty."""
     town = make_town(seed=7, density=60.0)
@@ -116,7 +115,7 @@ def test_lines_of_a_scan_far_apart_show_what_lies_between_them(run, gap, tmp_pat
         assert 0.6 * area < place["area"] < 1.1 * area
 
 
-@pytest.mark.parametrize("slope", [(0.15, 0.0), (-0.1, 0.12), (0.2, 0.15)])
+@pytest.mark.parametrize("slope", [(-0.1, 0.12), (0.2, 0.15)])
 def test_what_lies_bare_on_a_slope_is_lost(slope, tmp_path):
     """The ground under a house is higher than its lowest place by more than a metre."""
     town = stand_on_slope(make_town(density=8.0), np.array(slope))
@@ -164,8 +163,9 @@ def lay_corner_bare(town, id, size):
     return corner
 
 
-@pytest.mark.parametrize("density", [4.0, 8.0, 16.0])
-@pytest.mark.parametrize("size", [(6.0, 5.0), (4.0, 3.0), (10.0, 7.0)])
+@pytest.mark.parametrize(
+    ("size", "density"), [((6.0, 5.0), 8.0), ((4.0, 3.0), 4.0), ((10.0, 7.0), 16.0)]
+)
 def test_a_model_loses_a_corner_that_lies_bare_or_is_not_good(run, size, density, tmp_path):
     town = make_town(seed=7, density=density)
     corner = lay_corner_bare(town, "house-1", size)
@@ -190,7 +190,7 @@ def test_full_trust_in_footprints_keeps_the_model_and_says_so(run, tmp_path):
     assert "of bare ground inside its footprint is roofed over" in row["house-1"]["detail"]
 
 
-@pytest.mark.parametrize("density", [0.5, 0.7, 1.0, 1.5])
+@pytest.mark.parametrize("density", [0.5, 1.0])
 def test_a_sparse_survey_covers_what_it_covers(run, density, tmp_path):
     town = make_town(seed=8, density=density)
     lay_bare(town, "house-2", 0.0)
@@ -224,7 +224,7 @@ def test_a_model_stays_where_a_crown_hides_its_roof(run, tmp_path):
     assert after["parts"] == before["parts"]
 
 
-@pytest.mark.parametrize("rise", [0.25, 0.3, -0.35])
+@pytest.mark.parametrize("rise", [0.25, -0.35])
 def test_a_roof_that_moved_a_little_moved_as_a_whole(run, rise, tmp_path):
     """Of its cells a quarter differs by more than chance: the others are too few points."""
     town = make_town(seed=7)

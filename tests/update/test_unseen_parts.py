@@ -116,8 +116,7 @@ def test_a_house_that_the_survey_hardly_covers_has_a_place(run, kept, tmp_path):
     assert place["area"] == pytest.approx(area_m2, rel=0.25)
 
 
-@pytest.mark.parametrize("density", [1.0, 4.0, 12.0])
-@pytest.mark.parametrize("through", [0.0, 0.15, 0.4])
+@pytest.mark.parametrize(("through", "density"), [(0.0, 1.0), (0.15, 12.0), (0.4, 4.0)])
 def test_a_survey_covers_the_rubble_of_a_house(run, through, density, tmp_path):
     """Whatever share of the pulses reaches the ground."""
     town, _ = make_winged(density, 4)
@@ -170,8 +169,7 @@ def find(roof, old, new):
     return 0.0 if place is None else place.area
 
 
-@pytest.mark.parametrize("has_old", [True, False])
-@pytest.mark.parametrize("density", [0.5, 3.0])
+@pytest.mark.parametrize(("density", "has_old"), [(0.5, True), (3.0, False)])
 def test_chance_hides_no_part_of_a_hundred_roofs(density, has_old):
     rng, areas = np.random.default_rng([int(2 * density), has_old]), []
     for _ in range(100):
@@ -181,8 +179,7 @@ def test_chance_hides_no_part_of_a_hundred_roofs(density, has_old):
     assert sum(area > 0 for area in areas) <= 1, sorted(areas)[-3:]
 
 
-@pytest.mark.parametrize("has_old", [True, False])
-@pytest.mark.parametrize("density", [1.0, 10.0])
+@pytest.mark.parametrize(("density", "has_old"), [(1.0, False), (10.0, True)])
 def test_a_hidden_end_of_a_roof_is_measured(density, has_old):
     rng, ratios = np.random.default_rng([int(density), 3]), []
     while len(ratios) < 20:
@@ -200,7 +197,7 @@ def test_a_hidden_end_of_a_roof_is_measured(density, has_old):
     assert max(ratios) < 1.4
 
 
-@pytest.mark.parametrize("density", [3.0, 8.0, 16.0])
+@pytest.mark.parametrize("density", [3.0, 16.0])
 def test_water_on_a_flat_roof_is_a_hole(density):
     """Points are left along its edges alone, so hardly any cell is full."""
     rng, ratios = np.random.default_rng([int(density), 4]), []
