@@ -3,6 +3,15 @@
 import numpy as np
 import pytest
 
+from hiproof.fit.prices import (
+    BASE_COST,
+    LOOSE_COST,
+    PART_COST,
+    REPLACING_COST,
+    SKEW_UNITS,
+    SLACK_UNITS,
+    UNKNOWN_UNITS,
+)
 from hiproof.fit.union.add import NOTHING_LEFT, ROOF_IS_KNOWN, add_candidates, find_best_addition
 from hiproof.fit.union.around import (
     compute_roof_everywhere,
@@ -33,15 +42,6 @@ from hiproof.fit.union.objective import (
     compute_costs,
     compute_objective,
     compute_objective_with,
-)
-from hiproof.fit.union.prices import (
-    BASE_COST,
-    LEANING_COST,
-    LOOSE_COST,
-    PARAMETER_COST,
-    PART_COST,
-    REPLACING_COST,
-    SLACK_UNITS,
 )
 from hiproof.fit.union.refit import refit
 from hiproof.fit.union.scene import list_nodes
@@ -216,7 +216,7 @@ def count_units(row):
         row[TIE], min(along + across, 1)
     )
     leaning = (is_present[:N_SIDES] & (row[LEAN0 : LEAN0 + N_SIDES] != 0)).sum()
-    units = PART_COST + PARAMETER_COST * (is_present.sum() + slopes) + LEANING_COST * leaning
+    units = PART_COST + UNKNOWN_UNITS * (is_present.sum() + slopes) + SKEW_UNITS * leaning
     return units + REPLACING_COST * (row[REPLACES] > 0)
 
 

@@ -3,12 +3,43 @@
     misfit of every point and unobserved cell
     + unit * (volumes + unknowns + corners + metres of low steps)
 
-A unit is as many points as it must explain. Nothing but this table decides between two roofs.
+A unit is as many points as it must explain. Nothing but this table decides between two roofs. The
+search compares roofs that are not drawn: it knows no corners and steps, and prices volumes higher
+and loose edges in their place.
 """
 
 from __future__ import annotations
 
-from .union.prices import DENSE_CLOUD, DENSE_GROWTH, DETAIL_FACTOR
+import math
+
+import numpy as np
+
+# The unit: as many points as a unit of structure must explain.
+
+DENSE_CLOUD, DENSE_GROWTH = 8.0, 0.3
+"""Density [points/m2] from which on a unit explains a larger area, and its growth.
+
+Residuals of neighbouring points are not independent, the less so the denser the cloud
+(`benchmarks.hand_drawn`, with footprints: 83.0 to 84.1 % of edges).
+"""
+
+DETAIL_FACTOR = {"fine": 0.5, "full": 1.0, "main": 4.0}
+"""Price of structure by detail: below a half every chimney is a part, above four even wings go."""
+
+COMMON_HOUSE_M2 = 60.0  # Larger roofs, up to LARGE_ROOF_M2, ask more of each volume of the search.
+LARGE_ROOF_M2 = 200.0
+"""Area (m2) from which on the search's price of structure does not depend on a roof's size.
+
+Larger roofs are searched block by block.
+"""
+
+LARGE_ROOF_POINTS = 1.77
+"""Points that a unit of a large roof must explain at least in the search, times those of a house.
+
+Of many places some gain a point or two by chance. At 2 points/m2 The Hague draws too much for less.
+"""
+
+# What a roof costs.
 
 DEAD_M = 0.08  # Difference (m) that a person would leave out: it costs nothing.
 VOLUME_UNITS = 0.5  # A visible volume.
@@ -37,3 +68,48 @@ def compute_unit(density: float, settings) -> float:
     area_m2 = settings.evidence_area_m2 * max(density / DENSE_CLOUD, 1.0) ** DENSE_GROWTH
     points = max(settings.evidence_points, area_m2 * density)
     return float(points) * DETAIL_FACTOR[settings.detail]
+
+
+def compute_unit_points(density: float, area_m2: float, settings) -> float:
+    """Compute the points that one unit of structure must explain.
+
+    They are those of an area that grows with the roof's, and never too few.
+    """
+    large = area_m2 > LARGE_ROOF_M2
+    dense = max(density / DENSE_CLOUD, 1.0) ** DENSE_GROWTH
+    factor = dense if large else math.sqrt(max(area_m2 / COMMON_HOUSE_M2, 1.0))
+    points = settings.evidence_points * (LARGE_ROOF_POINTS if large else 1.0)
+    share = settings.evidence_area_m2 * factor
+    return float(max(points, share * density)) * DETAIL_FACTOR[settings.detail]
+
+
+# What structure costs in the search, which draws nothing, in units.
+
+PART_COST = 1.0  # a volume, besides its offsets and slopes
+REPLACING_COST, BASE_COST = 0.5, 0.95  # a volume that replaces others; a visible base
+LOOSE_COST = 0.6  # an edge where neither a corner of the outline nor another volume has one
+
+KIND_COST = np.array([1.0, 1.4, 1.4, 1.9])
+"""A plane among the candidates: level, sloping along u, along v, and freely."""
+
+# What a change must gain besides, in units.
+
+FREE_UNITS, FREELY_UNITS = 1.5, 8.0  # a plane that faces no wall; a new volume with such a plane
+REGROWN_UNITS = 0.5  # a roof grown anew: less is gained by cutting finer, too
+
+# What a change may cost that a draughtsman would make, in units.
+
+SLACK_UNITS = 0.02  # drawing a hidden edge in: what is hidden explains nothing
+
+# How far above the best a change may begin and still become the best, in units.
+
+BEGIN_UNITS, BEGIN_SHARE = 2.0, 0.01  # a move of one volume; besides, a share of the points
+NEW_UNITS, NEW_MOVED_UNITS = 6.0, 1.0
+"""A new volume, and one whose edges were moved once."""
+
+# How much the points of a place must cost for a volume to be looked for.
+
+ROOF_UNITS = 5.0  # of a roof that explains all but poorly
+
+# How nearly two roofs must cost the same to be one, and before the last volume is fitted in.
+SAME_UNITS, SAME_BEFORE_UNITS = 0.1, 2.0

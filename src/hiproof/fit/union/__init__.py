@@ -11,7 +11,6 @@ planes      compiled: planes and gables that explain rectangles of points
 candidates  volumes made of these planes, and where each would gain most
 volumes     compiled: a volume as a row of numbers, and the heights of a roof
 around      compiled: the heights that the other volumes leave for one
-prices      the table of prices: what a unit is, what structure costs, what a change must gain
 objective   compiled: the cost of a roof: misfit, volumes, edges on lines of their own
 edges       compiled: moves of a volume's edges
 refit       compiled: least squares for a volume's planes

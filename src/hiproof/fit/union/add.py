@@ -7,12 +7,7 @@ from collections import namedtuple
 import numpy as np
 
 from ...compiled import compiled
-from .around import measure_context
-from .candidates import SAME_SLOPE, find_best_rectangles
-from .edges import EVERYWHERE, NO_GAIN, move_edges
-from .improve import improve
-from .objective import compute_costs, compute_objective_with
-from .prices import (
+from ..prices import (
     FREELY_UNITS,
     NEW_MOVED_UNITS,
     NEW_UNITS,
@@ -21,6 +16,11 @@ from .prices import (
     SAME_BEFORE_UNITS,
     SAME_UNITS,
 )
+from .around import measure_context
+from .candidates import SAME_SLOPE, find_best_rectangles
+from .edges import EVERYWHERE, NO_GAIN, move_edges
+from .improve import improve
+from .objective import compute_costs, compute_objective_with
 from .refit import refit
 from .volumes import (
     DIRECTION,

@@ -9,9 +9,9 @@ import numpy as np
 
 from ...compiled import compiled
 from ...geometry.arrays import find_place
+from ..prices import BASE_COST
 from .around import compute_roof_everywhere
 from .objective import BASE_SHARE, compute_costs, price_loose_edges
-from .prices import BASE_COST
 from .volumes import (
     DIRECTION,
     LEVEL,

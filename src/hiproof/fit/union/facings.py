@@ -9,11 +9,11 @@ from __future__ import annotations
 import numpy as np
 
 from ...compiled import compiled
+from ..prices import FREE_UNITS
 from .around import is_visible_at
 from .edges import EVERYWHERE, NO_GAIN
 from .moves import settle_move
 from .objective import compute_objective_with
-from .prices import FREE_UNITS
 from .refit import refit
 from .volumes import (
     DIRECTION,

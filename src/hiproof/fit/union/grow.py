@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..prices import REGROWN_UNITS
 from .add import (
     FEWEST_UNEXPLAINED,
     NOTHING_LEFT,
@@ -28,7 +29,6 @@ from .improve import improve
 from .moves import MOST_TYPICAL_SLOPES, remove_volume
 from .objective import compute_objective
 from .plan import MIN_STRUCTURE_POINTS, find_cells
-from .prices import REGROWN_UNITS
 from .scene import Scene
 from .volumes import N_SIDES, OFFSET0, SLOPE0, make_base
 

@@ -16,10 +16,10 @@ from __future__ import annotations
 import numpy as np
 
 from ...compiled import compiled
+from ..prices import BEGIN_SHARE, BEGIN_UNITS, UNKNOWN_UNITS
 from .around import compute_roof_everywhere, compute_roof_with, measure_context
 from .edges import BEYOND_OUTLINE_M, EVERYWHERE, NO_GAIN, move_edges
 from .objective import compute_objective, compute_objective_with, compute_point_cost
-from .prices import BEGIN_SHARE, BEGIN_UNITS, PARAMETER_COST
 from .refit import refit
 from .volumes import (
     DIRECTION,
@@ -165,7 +165,7 @@ def add_planes(volumes, scene, value, k, slopes, context):
         if volumes[k, OFFSET0 + plane] < np.inf or seeds[plane] < FEWEST_SEEDS:
             continue
         trial_slopes = list_trial_slopes(volumes[k], plane, slopes)
-        least_gain = 0.6 * scene.evidence * PARAMETER_COST
+        least_gain = 0.6 * scene.evidence * UNKNOWN_UNITS
         gain, slope, offset = find_best_plane(
             volumes,
             scene,

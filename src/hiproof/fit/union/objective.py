@@ -13,8 +13,8 @@ from __future__ import annotations
 import numpy as np
 
 from ...compiled import compiled
+from ..prices import BASE_COST, LOOSE_COST
 from .around import compute_roof_with
-from .prices import BASE_COST, LOOSE_COST
 from .volumes import DIRECTION, LEVEL, OFFSET0, U0, compute_roof_heights, is_allowed, price_volume
 
 SAME_LINE_M = 1e-6  # Edges nearer (m) than this to a line lie on it.

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...compiled import compiled
 from ...geometry.arrays import compute_median, copy_row, copy_rows, list_distinct, sort_order
-from .prices import KIND_COST
+from ..prices import KIND_COST
 from .volumes import SLOPE_LOW
 
 MAX_SLOPE = 2.5  # Steepest slope (rise over run), 68 degrees.

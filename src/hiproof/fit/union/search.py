@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
+from ..prices import LARGE_ROOF_M2, compute_unit_points
 from .allowed import list_allowed_shapes
 from .blocks import HeightRaster
 from .grow import grow
@@ -15,7 +16,6 @@ from .large import search_box
 from .moves import refit_volumes
 from .objective import compute_objective, is_base_visible
 from .plan import Plan
-from .prices import LARGE_ROOF_M2, compute_unit_points
 from .scene import find_directions, make_scene, thin_scene
 from .trim import trim
 from .volumes import make_base

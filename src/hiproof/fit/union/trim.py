@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..prices import SLACK_UNITS
 from .moves import remove_volume
 from .objective import compute_objective
-from .prices import SLACK_UNITS
 from .scene import Scene, list_nodes
 from .volumes import (
     DIRECTION,

@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...compiled import compiled
-from .prices import LEANING_COST, PARAMETER_COST, PART_COST, REPLACING_COST
+from ..prices import PART_COST, REPLACING_COST, SKEW_UNITS, UNKNOWN_UNITS
 
 DIRECTION = 0  # Column of a volume's row: the number of its direction.
 # Columns of its rectangle, in metres of that direction's axes.
@@ -214,10 +214,8 @@ def price_volume(row):
     replacing = REPLACING_COST if row[REPLACES] > 0.0 else 0.0
     leaning = 0.0
     for k in range(N_SIDES):
-        leaning += LEANING_COST if row[LEAN0 + k] != 0.0 and row[OFFSET0 + k] < np.inf else 0.0
-    return (
-        PART_COST + PARAMETER_COST * (count_planes(row) + count_slopes(row)) + replacing + leaning
-    )
+        leaning += SKEW_UNITS if row[LEAN0 + k] != 0.0 and row[OFFSET0 + k] < np.inf else 0.0
+    return PART_COST + UNKNOWN_UNITS * (count_planes(row) + count_slopes(row)) + replacing + leaning
 
 
 @compiled
