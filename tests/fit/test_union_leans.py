@@ -74,7 +74,7 @@ def test_facing_walls_never_costs(seed):
             scene,
             value,
             k,
-            measure_context(volumes, scene.U, scene.V, scene.order, k),
+            measure_context(volumes, scene.U, scene.V, k),
         )
         assert lower <= value
         assert compute_objective(result, scene) == pytest.approx(lower, rel=1e-9)
@@ -95,7 +95,7 @@ def test_facing_walls_takes_no_plane_away(seed):
             scene,
             compute_objective(volumes, scene),
             k,
-            measure_context(volumes, scene.U, scene.V, scene.order, k),
+            measure_context(volumes, scene.U, scene.V, k),
         )
         n_kept, is_given = (
             np.isfinite(rows[k, OFFSET0 : OFFSET0 + N_SIDES]) for rows in (result, volumes)

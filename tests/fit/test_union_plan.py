@@ -41,7 +41,7 @@ def lay_out_scene(rng, outline, volumes=None):
     plan = lay_out_plan(np.column_stack([xy, np.zeros(len(xy))]), outline)
     scene = make_scene(plan, outline, [0.0], 3.0, 0.25, list_allowed_shapes(()))
     if volumes is not None:
-        scene = scene._replace(z=compute_roof_heights(volumes, scene.U, scene.V, scene.order)[0])
+        scene = scene._replace(z=compute_roof_heights(volumes, scene.U, scene.V)[0])
     return plan, scene
 
 

@@ -97,7 +97,7 @@ def find_unexplained(volumes, scene):
 
     If there are hardly any but the roof is expensive, these are the points that it explains poorly.
     """
-    z, _ = compute_roof_heights(volumes, scene.U, scene.V, scene.order)
+    z, _ = compute_roof_heights(volumes, scene.U, scene.V)
     cost = compute_costs(z, scene)[: scene.n]
     unexplained_points = np.nonzero(cost > UNEXPLAINED)[0]
     if len(unexplained_points) < FEWEST_UNEXPLAINED and cost.sum() > ROOF_UNITS * scene.evidence:
@@ -114,7 +114,7 @@ def find_best_addition(volumes, value, ground, candidates):
     best, lowest, scene = volumes, np.inf, ground.scene
     if len(candidates) == 0:
         return best, lowest
-    context = measure_context(volumes, scene.U, scene.V, scene.order, len(volumes))
+    context = measure_context(volumes, scene.U, scene.V, len(volumes))
     z_now = context.roof_without
     cost_now = compute_costs(z_now, scene)
     for replacing in (False, True):
@@ -178,7 +178,7 @@ def cut_back_neighbours(volumes, extended, scene, best, lowest, value, surcharge
             if CUT_LEAST_M < overhang < CUT_MOST_SHARE * (end - start):
                 cut = extended.copy()
                 cut[j, U0 + edge] = stop
-                context = measure_context(cut, scene.U, scene.V, scene.order, last)
+                context = measure_context(cut, scene.U, scene.V, last)
                 trial, trial_value = settle_new(cut, scene, min(value, lowest) - surcharge, context)
                 if trial_value < np.inf:
                     best, lowest = trial, trial_value

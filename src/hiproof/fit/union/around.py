@@ -16,7 +16,6 @@ from .volumes import (
     DIRECTION,
     REPLACES,
     find_lowest,
-    find_strip,
     is_within,
     read_coefficients,
     read_rectangle,
@@ -31,10 +30,10 @@ where one of them replaces it. `roof_without` is the height of the roof without 
 
 
 @compiled
-def measure_context(volumes, U, V, order, k):
+def measure_context(volumes, U, V, k):
     """Return what the others leave for volume k at U, V (directions, n).
 
-    `order` is that of `compute_roof_heights`. A new volume comes after all.
+    A new volume comes after all.
     """
     n = U.shape[1]
     earlier, later, roof_without = np.full(n, -np.inf), np.full(n, -np.inf), np.full(n, -np.inf)
@@ -45,17 +44,6 @@ def measure_context(volumes, U, V, order, k):
         direction = int(volumes[j, DIRECTION])
         u, v, ends = U[direction], V[direction], read_rectangle(volumes, j)
         c, replaces = read_coefficients(volumes, j), volumes[j, REPLACES] > 0.0
-        axis, first, last = find_strip(volumes, j, U, V, order)
-        if last - first < n:
-            for q in range(first, last):
-                i = order[direction, axis, q]
-                if is_within(ends, u[i], v[i]):
-                    h = find_lowest(c, u[i], v[i])
-                    if replaces or h > roof_without[i]:
-                        roof_without[i] = h
-                    if j > k:
-                        later[i] = max(later[i], np.inf if replaces else h)
-            continue
         if j < k:
             for i in range(n):  # no branches: a processor does several places at once
                 h = find_lowest(c, u[i], v[i])

@@ -37,11 +37,11 @@ def improve(volumes, scene, value, slopes, rounds):
         value_before = value
         for k in range(len(volumes)):
             if k == 0 or is_unsettled(volumes, scene.turn, k):
-                context = measure_context(volumes, scene.U, scene.V, scene.order, k)
+                context = measure_context(volumes, scene.U, scene.V, k)
                 volumes, value = refit_volume(volumes, scene, value, k, context)
         for k in range(1, len(volumes)):
             if is_unsettled(volumes, scene.turn, k):
-                context = measure_context(volumes, scene.U, scene.V, scene.order, k)
+                context = measure_context(volumes, scene.U, scene.V, k)
                 value = move_edges(volumes, scene, k, value, EVERYWHERE, context)
         volumes, value = drop_volumes(volumes, scene, value)
         for k in range(1, len(volumes)):
@@ -59,7 +59,7 @@ def improve(volumes, scene, value, slopes, rounds):
 @compiled
 def change_planes(volumes, scene, value, k, slopes):
     """Make all moves that change which planes volume k has, their ties and facings."""
-    context = measure_context(volumes, scene.U, scene.V, scene.order, k)
+    context = measure_context(volumes, scene.U, scene.V, k)
     volumes, value = drop_planes(volumes, scene, value, k, context)
     volumes, value = change_ties(volumes, scene, value, k, context)
     volumes, value = face_walls(volumes, scene, value, k, context)

@@ -76,7 +76,7 @@ def remove_volume(volumes, k):
 def refit_volumes(volumes, scene, value):
     """Refit every volume once, where that helps."""
     for k in range(len(volumes)):
-        context = measure_context(volumes, scene.U, scene.V, scene.order, k)
+        context = measure_context(volumes, scene.U, scene.V, k)
         volumes, value = refit_volume(volumes, scene, value, k, context)
     return volumes, value
 
@@ -94,7 +94,7 @@ def refit_volume(volumes, scene, value, k, context):
 def move_all_edges(volumes, scene, value, reach):
     """Move the edges of every volume, in place."""
     for k in range(1, len(volumes)):
-        context = measure_context(volumes, scene.U, scene.V, scene.order, k)
+        context = measure_context(volumes, scene.U, scene.V, k)
         value = move_edges(volumes, scene, k, value, reach, context)
     return value
 

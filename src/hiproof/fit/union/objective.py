@@ -61,7 +61,7 @@ def compute_objective(volumes, scene):
     for k in range(1, len(volumes)):
         if not is_allowed(volumes[k], scene.allowed):
             return np.inf
-    z, _ = compute_roof_heights(volumes, scene.U, scene.V, scene.order)
+    z, _ = compute_roof_heights(volumes, scene.U, scene.V)
     return compute_roof_cost(volumes, scene, z)
 
 
@@ -124,7 +124,7 @@ def is_base_visible(volumes: np.ndarray, scene, count_points: bool = False) -> b
 
     Where it ends at the border of a block, points count, each as half (`count_points`).
     """
-    _, top = compute_roof_heights(volumes, scene.U, scene.V, scene.order)
+    _, top = compute_roof_heights(volumes, scene.U, scene.V)
     cells = scene.weight[scene.n :][top[scene.n :] == 0].sum()
     points = 0.5 * np.count_nonzero(top[: scene.n] == 0) * count_points
     return len(volumes) == 1 or bool(max(cells, points) > BASE_SHARE * scene.n)

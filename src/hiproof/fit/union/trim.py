@@ -16,7 +16,6 @@ from .volumes import (
     DIRECTION,
     U0,
     U1,
-    UNSORTED,
     V0,
     V1,
     compute_roof_heights,
@@ -36,7 +35,7 @@ def trim(volumes: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray, f
     """
     volumes, value = draw_out(volumes, scene, value)
     U, V = list_nodes(scene)
-    _, top = compute_roof_heights(volumes, U, V, UNSORTED)
+    _, top = compute_roof_heights(volumes, U, V)
     k = 1
     for number in range(1, len(volumes)):
         visible = top == number
@@ -111,5 +110,5 @@ def changes_heights(
     first, last = sorted((volumes[k, edge], trial[k, edge]))
     is_between = (first <= x) & (x <= last)
     U, V = (np.ascontiguousarray(axis[:, is_between]) for axis in (U, V))
-    heights = [compute_roof_heights(rows, U, V, UNSORTED)[0] for rows in (volumes, trial)]
+    heights = [compute_roof_heights(rows, U, V)[0] for rows in (volumes, trial)]
     return not np.array_equal(*heights)

@@ -41,10 +41,6 @@ OPPOSITE = 1.0  # The tie under which slopes that face each other are equal.
 ALL_EQUAL = 2.0  # The tie under which all slopes are equal.
 SLOPE_LOW = 0.01  # A flatter slope (rise over run), half a degree, is level.
 SLOPE_HIGH = 2.75  # A steeper slope (rise over run), 70 degrees, is a wall.
-# Share of the extent of all places up to which those of a strip are looked at one after another. Of
-# wider ones, all are looked at, several at once.
-SPARSE_SHARE = 0.5
-UNSORTED = np.zeros((1, 2, 0), np.int64)  # The order of places that are not sorted.
 
 
 def make_base(height: float) -> np.ndarray:
@@ -127,65 +123,19 @@ def measure_run(row, k, u, v):
 
 
 @compiled
-def compute_roof_heights(volumes, U, V, order):
-    """Return the height (n,) of the roof and the visible volume (n,) at U, V.
-
-    These are (directions, n), and `order` is that of `scene.sort_along`, or UNSORTED.
-    """
+def compute_roof_heights(volumes, U, V):
+    """Return the height (n,) of the roof and the visible volume (n,) at U, V (directions, n)."""
     n = U.shape[1]
     z, top = np.full(n, -np.inf), np.zeros(n, np.int64)
     for k in range(len(volumes)):
         direction = int(volumes[k, DIRECTION])
         u, v, ends = U[direction], V[direction], read_rectangle(volumes, k)
         c, replaces = read_coefficients(volumes, k), volumes[k, REPLACES] > 0.0
-        axis, first, last = find_strip(volumes, k, U, V, order)
-        if last - first < n:
-            for q in range(first, last):
-                i = order[direction, axis, q]
-                if is_within(ends, u[i], v[i]):
-                    h = find_lowest(c, u[i], v[i])
-                    if replaces or h > z[i]:
-                        z[i], top[i] = h, k
-            continue
         for i in range(n):  # no branches: a processor does several points at once
             h = find_lowest(c, u[i], v[i])
             shows = is_within(ends, u[i], v[i]) & (replaces | (h > z[i]))
             z[i], top[i] = h if shows else z[i], k if shows else top[i]
     return z, top
-
-
-@compiled
-def find_strip(volumes, k, U, V, order):
-    """Find the strip of places that ends where volume k does along one axis.
-
-    Returns the axis, and the first and last number in `order` of the places U, V (directions, n).
-    They are 0 and n if the places are not sorted, or if the strip would be a wide one.
-    """
-    n, direction = U.shape[1], int(volumes[k, DIRECTION])
-    if n == 0 or order.shape[2] != n:
-        return 0, 0, n
-    for axis in range(2):
-        X, low, high = U if axis == 0 else V, volumes[k, U0 + 2 * axis], volumes[k, U1 + 2 * axis]
-        least = X[direction, order[direction, axis, 0]]
-        most = X[direction, order[direction, axis, n - 1]]
-        if min(high, most) - max(low, least) > SPARSE_SHARE * (most - least):
-            continue
-        first, last = 0, n
-        while first < last:
-            q = (first + last) // 2
-            if X[direction, order[direction, axis, q]] < low:
-                first = q + 1
-            else:
-                last = q
-        end, last = first, n
-        while end < last:
-            q = (end + last) // 2
-            if X[direction, order[direction, axis, q]] <= high:
-                end = q + 1
-            else:
-                last = q
-        return axis, first, end
-    return 0, 0, n
 
 
 @compiled
