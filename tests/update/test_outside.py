@@ -13,6 +13,7 @@ from jsonschema import Draft202012Validator
 from hiproof.city.request import Request
 from hiproof.city.run import reconstruct_area
 from hiproof.errors import InputError
+from hiproof.frames import turn_points
 from hiproof.model import PointCloud
 from hiproof.parametric.run import build_file
 from hiproof.parametric.schema import schema
@@ -107,6 +108,41 @@ def test_roofs_outside_all_outlines_are_told_apart(update):
         assert common > 0.75, kind
     box = shapely.box(*(np.array(EXTENSION) + [*ORIGIN[:2], *ORIGIN[:2]]))
     assert places["extended"].intersection(box).area > 0.75 * box.area
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.3, 0.7])
+@pytest.mark.parametrize("gap", [(11, 20, 16.5, 23.5), (11, 20, 17, 23)])
+def test_an_extension_that_fills_a_gap_between_others_is_found(gap, turn, tmp_path):
+    """Most of its cells lie beside an outline: of 20 m2 four square metres do not."""
+    x0, y0, x1, y1 = gap
+    before, after = make_town(houses=1, density=8.0), make_town(houses=1, seed=7, density=8.0)
+    sides = {"west": (x0 - 3, y0, x0, y1), "east": (x1, y0, x1 + 3, y1)}
+    for town in (before, after):
+        for side in sides.values():
+            put_block(town, side, 3.0)
+    put_block(after, gap, 3.0)
+    for name, town in (("first", before), ("second", after)):
+        town.xyz[:, :2] = ORIGIN[:2] + turn_points(town.xyz[:, :2] - ORIGIN[:2], turn)
+        write_cloud(tmp_path / f"{name}.laz", town.xyz, town.classification)
+    outlines = before.footprints | {
+        id: shapely.transform(shapely.box(*side), lambda xy: xy + ORIGIN[:2])
+        for id, side in sides.items()
+    }
+    for id, outline in outlines.items():
+        outlines[id] = shapely.transform(
+            outline, lambda xy: ORIGIN[:2] + turn_points(xy - ORIGIN[:2], turn)
+        )
+    footprints = str(write_footprints(tmp_path / "footprints.gpkg", outlines))
+    clouds = [str(tmp_path / f"{name}.laz") for name in ("first", "second")]
+    reconstruct_area(Request((clouds[0],), tmp_path / "run", footprints, id_attribute="id"))
+    parameters = str(tmp_path / "run" / "parameters.jsonl")
+    request = UpdateRequest(
+        (clouds[1],), tmp_path / "out", run=tmp_path / "run", run_parameters=parameters, date=DATE
+    )
+    assert update_area(request).outside == {"extended": 1}
+    with (tmp_path / "out" / "changes.csv").open() as file:
+        (row,) = (row for row in csv.DictReader(file) if row["class"] == "outside")
+    assert row["id"] == "house-0"
 
 
 @pytest.mark.parametrize("aside", [0.3, 0.5, 0.8])

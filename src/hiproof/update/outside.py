@@ -32,8 +32,9 @@ BESIDE_M = 1.0
 """Distance (m) from an outline within which roofs belong to it: gutters, and outlines drawn within
 some decimetres."""
 
-FEWEST_OUTSIDE = 8
-"""Cells of 1 m2 that a roof has beyond that: a shed of 3 by 3 m has them."""
+FEWEST_OUTSIDE, FEWEST_BEYOND = 8, 2
+"""Cells of 1 m2 that a roof has, and that it has beyond that distance: a shed of 3 by 3 m has them,
+and what fills a gap of 5 m between neighbours."""
 
 MOSTLY = 0.5
 """Share of the cells that show what stood there in the other survey."""
@@ -259,10 +260,11 @@ def describe_roofs(
     outlines: shapely.STRtree,
     kind: ChangeKind,
 ) -> Iterator[tuple[shapely.Geometry, np.ndarray, dict[str, Any]]]:
-    """Yield each roof among cells (k, 5): its place, the building beside it if any, its record.
+    """Yield each roof among cells (k, 5): its place, buildings beside it, its record.
 
-    Its confidence is the share of its cells that are sure (k,), `least` of them at least. That is
-    None where they are unknown, as is its height without `ground` (m, 5) near it.
+    The building that it adjoins most comes first. Its confidence is the share of its cells that are
+    sure (k,), `least` of them at least. That is None where they are unknown, as is its height
+    without `ground` (m, 5) near it.
     """
     for members in group_cells(points, is_core):
         share = None if is_sure is None else float(is_sure[members].mean())
@@ -278,11 +280,10 @@ def describe_roofs(
             "height": height if height is None else round(height, 2),
             "confidence": share if share is None else round(share, 2),
         }
-        yield (
-            place,
-            outlines.query_nearest(place, max_distance=BESIDE_M, all_matches=False),
-            record,
-        )
+        beside = outlines.query(place, predicate="dwithin", distance=BESIDE_M)
+        around = shapely.buffer(place, 2 * BESIDE_M)
+        shared = shapely.area(shapely.intersection(outlines.geometries[beside], around))
+        yield place, beside[np.argsort(-shared, kind="stable")], record
 
 
 def measure_height(points: np.ndarray, ground: np.ndarray) -> float | None:
@@ -300,16 +301,18 @@ def measure_height(points: np.ndarray, ground: np.ndarray) -> float | None:
 def group_cells(points: np.ndarray, is_core: np.ndarray) -> Iterator[np.ndarray]:
     """Yield the members of each roof among cells `points` (k, 5).
 
-    It has FEWEST_OUTSIDE of the core (k,) side by side that form a surface, and the cells beside
-    these.
+    It has FEWEST_BEYOND of the core (k,) side by side, and FEWEST_OUTSIDE with the cells beside
+    these, that form a surface.
     """
     core, keys = np.flatnonzero(is_core), find_keys(points)
     labels = label_components(len(core), link_neighbours(keys[core]))
-    for label in np.flatnonzero(np.bincount(labels) >= FEWEST_OUTSIDE):
+    for label in np.flatnonzero(np.bincount(labels) >= FEWEST_BEYOND):
         members = core[labels == label]
         grown = np.isin(keys, keys[members, None] + AROUND_KEYS) & ~is_core
         place = np.union1d(members, np.flatnonzero(grown))
-        if not is_strip(points[place]) and measure_roughness(points[members, :3]) <= ROUGH_M:
+        if len(place) < FEWEST_OUTSIDE or is_strip(points[place]):
+            continue
+        if measure_roughness(points[place, :3]) <= ROUGH_M:
             yield place
 
 
