@@ -52,7 +52,7 @@ test-oldest: $(VENV)-oldest/core
 	$(VENV)-oldest/bin/python -m pytest tests/test_compiled.py -k "not halves and not network"
 
 test-train: $(VENV)/train
-	$(BIN)/python -m pytest -m train
+	$(BIN)/python -m pytest -m train tests/learn
 
 lint: $(VENV)/lint
 	$(BIN)/ruff check .

@@ -58,8 +58,9 @@ def repeat(bundle, out):
     return CliRunner().invoke(app, ["repro", str(bundle), "--out", str(out)])
 
 
-@pytest.mark.parametrize("with_footprints", [True, False])
-@pytest.mark.parametrize("has_classes", [True, False])
+@pytest.mark.parametrize(
+    ("with_footprints", "has_classes"), [(True, True), (True, False), (False, False)]
+)
 def test_a_bundle_repeats_the_failure_to_the_last_digit(
     with_footprints, has_classes, tmp_path, set_failing_ids
 ):

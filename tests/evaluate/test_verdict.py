@@ -70,7 +70,7 @@ def cluster(count, height, centre=(6.0, 5.0), width=2.5):
     return np.column_stack([xy, np.linspace(6.0 + 0.9 * height, 6.0 + height, count)])
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.floats(2.0, 20.0))
 def test_the_true_roof_is_good(seed, density):
     roof = random_compound(np.random.default_rng(seed)).roof
@@ -83,7 +83,7 @@ def test_the_true_roof_is_good(seed, density):
     assert judge_model(model, points).grade is Grade.GOOD
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(st.floats(0.4, 20.0), st.sampled_from([-1.0, 1.0]))
 def test_a_roof_with_three_fifths_of_all_its_points_off_is_poor(off_m, side):
     """Those off lie near the outline of a narrow building, where a share of inner points does not
@@ -273,14 +273,14 @@ def compound(seed, density=6.0, noise_m=0.03):
     )
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(SEEDS, st.floats(2.0, 20.0), st.floats(0.0, 0.3))
 def test_points_of_one_roof_are_one_surface_whatever_their_noise(seed, density, noise_m):
     roof, points = compound(seed, density, noise_m)
     assert find_second_surface(points, roof) == (0.0, 0.0)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(
     SEEDS,
     st.floats(0.3, 6.0),
@@ -299,7 +299,7 @@ def test_a_second_surface_is_seen_wherever_the_model_lies_between_them(
     assert distance_m == pytest.approx(apart_m, abs=0.05)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(SEEDS, st.floats(0.5, 5.0))
 def test_a_part_that_the_model_lacks_is_no_second_surface(seed, height_m):
     roof, points = compound(seed)
@@ -318,7 +318,7 @@ def test_a_building_says_that_its_points_lie_on_two_surfaces():
     assert float(apart_m) == pytest.approx(0.4, abs=0.03)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(SEEDS, st.floats(2.0, 20.0), st.floats(0.5, 0.6))
 def test_a_part_without_points_is_told_of_whatever_their_density(seed, density, cut):
     roof, points = compound(seed, density)
@@ -335,7 +335,7 @@ def test_points_everywhere_leave_next_to_nothing_unseen_whatever_their_density(d
     assert max(shares) < 0.03
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(SEEDS, st.floats(2.0, 12.0), st.floats(20.0, 150.0), st.floats(4.0, 8.0))
 def test_a_strip_without_points_shows_however_large_the_outline_is(seed, density, side_m, strip_m):
     points = np.random.default_rng(seed).uniform(0, side_m, (int(density * side_m**2), 2))
@@ -345,7 +345,7 @@ def test_a_strip_without_points_shows_however_large_the_outline_is(seed, density
     assert strip_m - (REACH + 1.0) * gap_m < found_m < strip_m
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(SEEDS, st.floats(1.0, 6.0))
 def test_the_share_without_points_is_that_of_all_distances_to_a_fine_grid(seed, density):
     roof, points = compound(seed, density)

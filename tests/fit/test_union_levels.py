@@ -36,7 +36,7 @@ def test_boxes_that_touch_at_one_level_are_one_part(name, seed):
     assert len(flat) == 2
 
 
-@pytest.mark.parametrize("pitch", [1.0, 2.0])
+@pytest.mark.parametrize("pitch", [1.0])
 def test_a_hall_and_its_annex_with_a_pitch_of_a_degree_are_not_level(pitch):
     """They rise by 23 cm, more than a person would leave out."""
     outline, slope, found = shapely.box(0, 0, 45, 40), np.tan(np.radians(pitch)), 0
