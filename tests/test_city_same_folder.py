@@ -232,8 +232,15 @@ def test_a_folder_that_cannot_be_locked_says_so(tmp_path):
         pass
 
 
-@pytest.mark.parametrize("harm", ["removed", "cut", "one byte"])
-@pytest.mark.parametrize("name", ["buildings.gml", "parameters.jsonl", "buildings.gpkg"])
+@pytest.mark.parametrize(
+    ("name", "harm"),
+    [
+        ("buildings.gml", "removed"),
+        ("buildings.gml", "one byte"),
+        ("parameters.jsonl", "cut"),
+        ("buildings.gpkg", "one byte"),
+    ],
+)
 def test_a_file_that_was_lost_or_damaged_is_made_again(
     harm, name, town_files, reference_run, tmp_path, quick_tiles
 ):

@@ -30,15 +30,15 @@ def cut_town(overlap):
     return x < middle + overlap, x >= middle - overlap
 
 
-@pytest.mark.parametrize("overlap", [0.0, 8.0])
 @pytest.mark.parametrize(
-    "change, step",
+    "change, step, overlap",
     [
-        (lambda z: z + 43.2, "43.2[0-9] m above"),
-        (lambda z: z - 0.8, "0.[78][0-9] m below"),
-        (lambda z: z / 0.3048, "[0-9.]+ m above"),
+        (lambda z: z + 43.2, "43.2[0-9] m above", 8.0),
+        (lambda z: z - 0.8, "0.[78][0-9] m below", 0.0),
+        (lambda z: z - 0.8, "0.[78][0-9] m below", 8.0),
+        (lambda z: z / 0.3048, "[0-9.]+ m above", 0.0),
     ],
-    ids=["ellipsoid", "a lower datum", "feet"],
+    ids=["ellipsoid", "a lower datum", "a lower datum in an overlap", "feet"],
 )
 def test_a_file_in_other_heights_is_named(change, step, overlap, tmp_path):
     west, east = cut_town(overlap)

@@ -100,15 +100,18 @@ def test_the_archive_is_small_and_holds_what_builds_and_tests_it(archive_and_whe
     assert archive_and_wheel[0].stat().st_size < 20e6
 
 
-def test_the_installed_wheel_is_imported_and_models_the_demo(installed_python, tmp_path):
+def test_the_installed_wheel_is_imported_and_models_houses_of_the_demo(installed_python, tmp_path):
     environment = {name: v for name, v in os.environ.items() if not name.startswith("PYTHON")}
-    code = "import hiproof; print(hiproof.__file__); print(hiproof.__version__)"
-    place, version = run(installed_python, "-c", code, cwd=tmp_path, env=environment).split()
+    code = "import hiproof.simulate; print(hiproof.__file__, hiproof.__version__, sep='\\n'); "
+    code += "print(*map(hiproof.simulate.demo_files().get, ('cloud', 'footprints')), sep='\\n')"
+    printed = run(installed_python, "-c", code, cwd=tmp_path, env=environment)
+    place, version, cloud, footprints = printed.splitlines()
     assert Path(place).is_relative_to(installed_python.parents[1])
     command = installed_python.with_name("hiproof.exe" if os.name == "nt" else "hiproof")
     assert run(command, "--version", env=environment).split() == ["hiproof", version]
-    output = run(command, "demo", "--out", tmp_path / "demo", env=environment)
-    assert "26 buildings" in output and (tmp_path / "demo/buildings.gml").stat().st_size > 10_000
+    few = ("--footprints", footprints, "--bbox", "91990,451000,92034,451040")
+    output = run(command, "reconstruct", cloud, *few, "--out", tmp_path / "out", env=environment)
+    assert "buildings" in output and (tmp_path / "out/buildings.gml").stat().st_size > 10_000
 
 
 def test_a_citation_names_the_version_that_is_there():

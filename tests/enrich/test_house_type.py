@@ -58,15 +58,12 @@ def simulate_street(seed, blocks=24):
 
 
 def test_types_of_simulated_streets(tmp_path):
-    right = total = 0
-    for seed in range(2):
-        houses, types = simulate_street(seed)
-        answers = answer_street(tmp_path / str(seed), houses)
-        named = {id: answers[id].attributes["hiproof_house_type"] for id in answers}
-        right += sum(named[id] == types[id] for id in types)
-        total += len(types)
-        assert {named[id] for id in named if id.endswith("garage")} <= {None}
-    assert total > 100 and right >= RIGHT_SHARE * total
+    houses, types = simulate_street(0)
+    answers = answer_street(tmp_path, houses)
+    named = {id: answers[id].attributes["hiproof_house_type"] for id in answers}
+    assert {named[id] for id in named if id.endswith("garage")} <= {None}
+    right = sum(named[id] == types[id] for id in types)
+    assert len(types) > 40 and right >= RIGHT_SHARE * len(types)
 
 
 @pytest.mark.parametrize(
@@ -109,7 +106,7 @@ def test_floor_areas_of_a_block_and_of_an_attic(tmp_path):
     assert floors["gable"][1] == pytest.approx(60 * (1 + 1 + 0.7 + 0.2))
 
 
-@settings(deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(
     eave_mm=st.integers(1000, 60000),
     rise=st.sampled_from([0.0, 0.5, 3.0, 8.0]),
