@@ -110,6 +110,26 @@ def test_roofs_outside_all_outlines_are_told_apart(update):
     assert places["extended"].intersection(box).area > 0.75 * box.area
 
 
+@pytest.mark.parametrize("classes, name", [((6, 1), "new"), ((1, 6), "earlier")])
+def test_a_survey_without_ground_says_that_no_roofs_outside_are_found(classes, name, tmp_path):
+    before, after = make_town(houses=2), make_town(houses=2, seed=7)
+    put_block(after, BUILT)
+    for file, town, code in zip(("first", "second"), (before, after), classes, strict=True):
+        town.classification[:] = np.where(code == 1, 1, town.classification)
+        write_cloud(tmp_path / f"{file}.laz", town.xyz, town.classification)
+    footprints = str(write_footprints(tmp_path / "footprints.geojson", before.footprints))
+    reconstruct_area(Request((str(tmp_path / "first.laz"),), tmp_path / "run", footprints))
+    request = UpdateRequest(
+        (str(tmp_path / "second.laz"),),
+        tmp_path / "out",
+        run=tmp_path / "run",
+        run_parameters=str(tmp_path / "run" / "parameters.jsonl"),
+        date=DATE,
+    )
+    with pytest.warns(UserWarning, match=f"the {name} survey has no points of a ground class"):
+        assert update_area(request).outside == {}
+
+
 @pytest.mark.parametrize("turn", [0.0, 0.3, 0.7])
 @pytest.mark.parametrize("gap", [(11, 20, 16.5, 23.5), (11, 20, 17, 23)])
 def test_an_extension_that_fills_a_gap_between_others_is_found(gap, turn, tmp_path):

@@ -8,6 +8,7 @@ misfits lie there. In clouds without building classes, level cells high above th
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ import shapely
 
 from ..city.plan.work_plan import WorkPlan, load_plan
 from ..city.work.sort import sort_cloud
+from ..errors import InputWarning
 from ..geometry.components import label_components
 from ..geometry.grid import AROUND_KEYS, KEY_OF_CELL, number_cells
 from ..model import PointCloud
@@ -177,8 +179,16 @@ def save_roofs_outside(state: Path, plan: WorkPlan, has_earlier: bool) -> None:
     jobs = [job for job in plan.jobs if not job.area.is_empty]
     outlines, names = shapely.STRtree([job.area for job in jobs]), [job.id for job in jobs]
     found = []
-    files = [path for folder in folders for path in list_files(folder)]
-    squares = [np.load(path)["squares"] for path in files]
+    files = [list_files(folder) for folder in folders]
+    for name, paths in zip(("new", "earlier")[: 1 + has_earlier], files, strict=False):
+        if not any(len(np.load(path)["ground"]) for path in paths):
+            warnings.warn(
+                f"the {name} survey has no points of a ground class, so roofs outside all "
+                "outlines, such as extensions and new buildings, are not found; add classes with "
+                "`hiproof classify`",
+                InputWarning,
+            )
+    squares = [np.load(path)["squares"] for paths in files for path in paths]
     for square in np.unique(np.concatenate([np.empty((0, 2)), *squares]), axis=0):
         low = square * BLOCK_M - BLOCK_REACH_M
         high = (square + 1) * BLOCK_M + BLOCK_REACH_M
