@@ -32,7 +32,6 @@ from .cells import (
     SurveyNoise,
     compare_points,
     find_slopes,
-    measure_residuals,
     select_inner,
     shrink_outline,
 )
@@ -507,8 +506,6 @@ def measure_noise(samples: list[SampledRoof]) -> SurveyNoise:
     Most roofs are unchanged, so medians tell it.
     """
     usual = SurveyNoise()
-    if len(samples) < FEWEST_ROOFS:
-        return usual
     scatter, differences, middles, strays = [], [], [], []
     for sample in samples:
         c = compare_points(sample.roof, sample.old, sample.new, usual)
@@ -519,7 +516,7 @@ def measure_noise(samples: list[SampledRoof]) -> SurveyNoise:
         middles.append(float(np.median(d)))
         differences.append((d - middles[-1]) ** 2 / 0.455 - expected)
         strays.append(float(flag_cells(c).sum() / compared.sum()))
-        scatter.append(measure_scatter(c.points, c.number, sample.roof))
+        scatter.append(measure_scatter(c.number, c.over))
     if len(middles) < FEWEST_ROOFS:
         return usual
     cell = np.sqrt(max(float(np.median(np.concatenate(differences))), LEAST_M**2))
@@ -532,16 +529,9 @@ def measure_noise(samples: list[SampledRoof]) -> SurveyNoise:
     return SurveyNoise(**rounded, stray=round(stray, 5))
 
 
-def measure_scatter(points: np.ndarray, number: np.ndarray, roof: Roof) -> float:
-    """Return the scatter (m) of points (n, 3) about the median of their cell (n,)."""
-    residuals = measure_residuals(roof, points)
-    order = np.lexsort([residuals, number])
-    number, residuals = number[order], residuals[order]
-    same = number[1:] == number[:-1]
-    if not same.any():
-        return float("nan")
-    n = np.bincount(number)
-    start = np.concatenate([[0], np.cumsum(n)])[:-1]
-    has = n >= 3
-    spread = residuals[start[has] + (3 * n[has]) // 4] - residuals[start[has] + n[has] // 4]
+def measure_scatter(number: np.ndarray, values: np.ndarray) -> float:
+    """Return the scatter of values (n,) about the median of their cell (n,)."""
+    ordered, n = values[np.lexsort([values, number])], np.bincount(number)
+    start, has = np.cumsum(n) - n, n >= 3
+    spread = ordered[start[has] + (3 * n[has]) // 4] - ordered[start[has] + n[has] // 4]
     return float(np.median(spread) / 1.349) if len(spread) else float("nan")
