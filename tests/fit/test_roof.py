@@ -7,7 +7,6 @@ import pytest
 import shapely
 
 from hiproof.compose import compose
-from hiproof.fit.prices import compute_unit
 from hiproof.fit.roof import add, fit_building, read_parts
 from hiproof.fit.roof.accept import LOOP_ROUNDS, fit_roof, improve, try_move
 from hiproof.fit.roof.draw import (
@@ -52,8 +51,7 @@ def begin_roof(kind, seed=0):
     settings = Settings().compound
     plan = lay_out_plan(points, outline)
     whole = lay_out_whole(plan, outline, settings)
-    unit = compute_unit(plan.density, settings)
-    site = make_site(whole.scene, whole.outline, unit, plan.border)
+    site = make_site(whole.scene, whole.outline, plan.border)
     volumes = find_volumes(whole, settings)
     roof = start_roof(volumes, whole.scene.turn, site)
     fit_roof(roof, site, 2)

@@ -63,7 +63,8 @@ def test_a_side_lies_on_a_wall_near_it_unless_points_lie_elsewhere(end, drawn_en
     volumes = np.vstack([make_base(-5.0), make_base(2.0)])
     volumes[1, U0 : V1 + 1] = -4.0, end, -4.0, 4.0
     plan, scene = lay_out_scene(np.random.default_rng(0), outline, volumes)
-    site = make_site(scene, shapely.transform(outline, plan.frame.uv_plan), 3.0, np.zeros((3, 0)))
+    scene = scene._replace(unit=3.0)
+    site = make_site(scene, shapely.transform(outline, plan.frame.uv_plan), np.zeros((3, 0)))
     volumes[1, U1] = drawn_end
     roof = start_roof(volumes, scene.turn, site)
     ends = -roof.half_planes[1, :2, 2] * roof.half_planes[1, :2, 0]

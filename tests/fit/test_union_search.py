@@ -175,7 +175,7 @@ def test_a_hidden_volume_changes_no_height_and_no_misfit(seed):
     paid = compute_objective(extended, scene) - compute_objective(volumes, scene)
     loose = count_loose_edges(extended, scene) - count_loose_edges(volumes, scene)
     units = price_volume(hidden) + LOOSE_COST * loose
-    assert paid == pytest.approx(scene.evidence * units, rel=1e-9)
+    assert paid == pytest.approx(scene.unit * units, rel=1e-9)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -262,9 +262,7 @@ def test_the_objective_is_misfit_and_complexity_counted_plainly(seed):
     units = sum(count_units(row) for row in volumes[1:])
     units += LOOSE_COST * count_loose_edges(volumes, scene)
     units += BASE_COST * (weight[top[scene.n :] == 0].sum() > BASE_SHARE * scene.n)
-    assert compute_objective(volumes, scene) == pytest.approx(
-        misfit + scene.evidence * units, rel=1e-9
-    )
+    assert compute_objective(volumes, scene) == pytest.approx(misfit + scene.unit * units, rel=1e-9)
 
 
 def test_shapes_that_are_not_allowed_cost_infinitely_much():
@@ -346,7 +344,7 @@ def test_an_edge_is_drawn_out_to_a_corners_line_for_next_to_nothing_or_stays(see
     outwards, result = draw_out(volumes, scene, value)
     assert (
         is_true(outwards, scene, result)
-        and result <= value + 4 * len(volumes) * SLACK_UNITS * scene.evidence
+        and result <= value + 4 * len(volumes) * SLACK_UNITS * scene.unit
     )
     assert np.array_equal(
         np.delete(outwards, range(U0, V1 + 1), 1), np.delete(volumes, range(U0, V1 + 1), 1)
@@ -491,7 +489,7 @@ def test_the_best_candidate_has_the_best_of_all_rectangles(seed, replacing):
     for m, (i0, i1, j0, j1) in enumerate(cells):
         gain = np.zeros((6, 6))
         fill_cell_gains(scene, candidates, m, (cell_u, cell_v), cost_now, z_now, replacing, gain)
-        price = scene.evidence * price_volume(candidates[m])
+        price = scene.unit * price_volume(candidates[m])
         brute[m], result[m] = search_all_rectangles(gain) - price, gain[i0:i1, j0:j1].sum() - price
     assert (
         gains.max() == pytest.approx(brute.max())

@@ -10,8 +10,6 @@ and loose edges in their place.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 # The unit: as many points as a unit of structure must explain.
@@ -25,19 +23,6 @@ Residuals of neighbouring points are not independent, the less so the denser the
 
 DETAIL_FACTOR = {"fine": 0.5, "full": 1.0, "main": 4.0}
 """Price of structure by detail: below a half every chimney is a part, above four even wings go."""
-
-COMMON_HOUSE_M2 = 60.0  # Larger roofs, up to LARGE_ROOF_M2, ask more of each volume of the search.
-LARGE_ROOF_M2 = 200.0
-"""Area (m2) from which on the search's price of structure does not depend on a roof's size.
-
-Larger roofs are searched block by block.
-"""
-
-LARGE_ROOF_POINTS = 1.77
-"""Points that a unit of a large roof must explain at least in the search, times those of a house.
-
-Of many places some gain a point or two by chance. At 2 points/m2 The Hague draws too much for less.
-"""
 
 # What a roof costs.
 
@@ -68,19 +53,6 @@ def compute_unit(density: float, settings) -> float:
     area_m2 = settings.evidence_area_m2 * max(density / DENSE_CLOUD, 1.0) ** DENSE_GROWTH
     points = max(settings.evidence_points, area_m2 * density)
     return float(points) * DETAIL_FACTOR[settings.detail]
-
-
-def compute_unit_points(density: float, area_m2: float, settings) -> float:
-    """Compute the points that one unit of structure must explain.
-
-    They are those of an area that grows with the roof's, and never too few.
-    """
-    large = area_m2 > LARGE_ROOF_M2
-    dense = max(density / DENSE_CLOUD, 1.0) ** DENSE_GROWTH
-    factor = dense if large else math.sqrt(max(area_m2 / COMMON_HOUSE_M2, 1.0))
-    points = settings.evidence_points * (LARGE_ROOF_POINTS if large else 1.0)
-    share = settings.evidence_area_m2 * factor
-    return float(max(points, share * density)) * DETAIL_FACTOR[settings.detail]
 
 
 # What structure costs in the search, which draws nothing, in units.

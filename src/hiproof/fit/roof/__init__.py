@@ -33,7 +33,6 @@ from ...primitives.catalogue import CATALOGUE, CURVED
 from ...primitives.family import name_among
 from ...read.plausible import is_plausible
 from ...settings import Settings
-from ..prices import compute_unit
 from ..shapes.curved import fit_shapes
 from ..shapes.regions import exclude_parts, list_polygons
 from ..shapes.shown import find_highest, keep_visible
@@ -112,9 +111,8 @@ def draw_parts(volumes: np.ndarray, whole: Whole, settings: Settings) -> tuple[l
     Returns the parts, and the price (points) of the drawn roof.
     """
     plan, types = whole.plan, settings.fit.types
-    unit = compute_unit(plan.density, settings.compound)
     keeps_shapes = bool(types) and not {*CATALOGUE} <= {*types, *CURVED}
-    site = make_site(whole.scene, whole.outline, unit, plan.border, keeps_shapes)
+    site = make_site(whole.scene, whole.outline, plan.border, keeps_shapes)
     roof, price = find_roof(volumes, whole, site)
     return read_parts(roof, site, whole.outline, plan, types), price
 

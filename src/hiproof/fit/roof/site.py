@@ -22,7 +22,7 @@ CONVEX_PART_M2 = 1e-6  # Area (m2) of the smallest part.
 
 
 def make_site(
-    scene, outline: shapely.Polygon, unit: float, border: np.ndarray, keeps_shapes: bool = False
+    scene, outline: shapely.Polygon, border: np.ndarray, keeps_shapes: bool = False
 ) -> Site:
     """Return the site of an `outline` (plan coordinates) with the points of a scene.
 
@@ -55,7 +55,7 @@ def make_site(
         scene.high,
         DEAD_M,
         scene.width,
-        unit,
+        scene.unit,
         parts,
         sizes,
         boxes,

@@ -88,7 +88,7 @@ def has_same_cost(value, known_value, scene, more_units):
 
     It may cost `more_units` more, which fitting may still gain.
     """
-    return -min(more_units, REGROWN_UNITS) < (value - known_value) / scene.evidence < more_units
+    return -min(more_units, REGROWN_UNITS) < (value - known_value) / scene.unit < more_units
 
 
 @compiled
@@ -100,7 +100,7 @@ def find_unexplained(volumes, scene):
     z, _ = compute_roof_heights(volumes, scene.U, scene.V)
     cost = compute_costs(z, scene)[: scene.n]
     unexplained_points = np.nonzero(cost > UNEXPLAINED)[0]
-    if len(unexplained_points) < FEWEST_UNEXPLAINED and cost.sum() > ROOF_UNITS * scene.evidence:
+    if len(unexplained_points) < FEWEST_UNEXPLAINED and cost.sum() > ROOF_UNITS * scene.unit:
         return np.nonzero(cost > POORLY)[0]
     return unexplained_points
 
@@ -129,7 +129,7 @@ def find_best_addition(volumes, value, ground, candidates):
             lines, new = scene.lines[int(candidates[m, DIRECTION])], extended[-1]
             new[U0], new[U1] = lines[0, cells[m, 0]], lines[0, cells[m, 1]]
             new[V0], new[V1] = lines[1, cells[m, 2]], lines[1, cells[m, 3]]
-            surcharge = FREELY_UNITS * scene.evidence if has_free_plane(new, scene) else 0.0
+            surcharge = FREELY_UNITS * scene.unit if has_free_plane(new, scene) else 0.0
             if replacing and len(volumes) > 1:
                 new[REPLACES] = 1.0
             trial, trial_value = settle_new(
@@ -203,7 +203,7 @@ def settle_new(volumes, scene, value, context):
     for units in NEW_UNITS, NEW_MOVED_UNITS:
         refit(volumes, scene, k, context)
         trial_value = compute_objective_with(volumes, scene, k, context)
-        if trial_value > value + units * scene.evidence:
+        if trial_value > value + units * scene.unit:
             return volumes, np.inf
         trial_value = move_edges(volumes, scene, k, trial_value, EVERYWHERE, context)
     return volumes, trial_value if trial_value < value - NO_GAIN else np.inf

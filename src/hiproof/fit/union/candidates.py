@@ -106,18 +106,18 @@ def list_candidates_along(
         np.ascontiguousarray(x[numbers]) for x in (scene.U[direction], scene.V[direction], scene.z)
     )
     cloud = Cloud(u, v, z, find_cells(grid.u, u), find_cells(grid.v, v))
-    evidence, tolerance = scene.evidence * len(numbers) / len(members), scene.dead + scene.width
+    unit, tolerance = scene.unit * len(numbers) / len(members), scene.dead + scene.width
     pool = pool_planes(
         cloud,
         grid,
         list_hypotheses(cloud, effort.seeds),
         tolerance,
-        evidence,
+        unit,
         most_planes,
     )
     if len(pool) == 0:
         return np.empty((0, COLUMNS))
-    gables, counts = pool_gables(cloud, grid, pool, tolerance, evidence)
+    gables, counts = pool_gables(cloud, grid, pool, tolerance, unit)
     middle = np.array([sort_values(u)[len(u) // 2], sort_values(v)[len(v) // 2]])
     along = turn_to_walls(pool, middle, scene.leans[direction])
     groups, sizes = group_planes(along, gables, counts, grid)
@@ -327,7 +327,7 @@ def find_best_rectangles(scene, candidates, cell_u, cell_v, cost_now, z_now, rep
     threshold, most_gain = 0.0, cost_now.sum()
     for m in range(len(candidates)):
         direction = int(candidates[m, DIRECTION])
-        price = scene.evidence * price_volume(candidates[m])
+        price = scene.unit * price_volume(candidates[m])
         least_gain = price + threshold
         if (
             most_gain <= least_gain

@@ -56,7 +56,7 @@ def move_edges(volumes, scene, k, value, reach, context):
             bare[i] = scene.weight[i] if everywhere[i] != base else 0.0
     fixed = cost_without.sum()
     for j in range(1, len(volumes)):
-        fixed += scene.evidence * price_volume(volumes[j])
+        fixed += scene.unit * price_volume(volumes[j])
     sums, places = np.empty((3, len(gain))), np.empty(count_most_places(scene, len(volumes)))
     for edge in range(4):
         m = list_edge_places(volumes, scene, k, edge, places)
@@ -74,7 +74,7 @@ def move_edges(volumes, scene, k, value, reach, context):
                 p += 1
             trial = fixed + (gains[p - 1] if p > 0 else 0.0)
             if always_bare - (covered[p - 1] if p > 0 else 0.0) > BASE_SHARE * scene.n:
-                trial += scene.evidence * BASE_COST
+                trial += scene.unit * BASE_COST
             if trial < best:
                 volumes[k, U0 + edge] = t
                 trial += price_loose_edges(volumes, scene)

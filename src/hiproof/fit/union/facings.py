@@ -77,7 +77,7 @@ def face_freely(volumes, scene, value, k, axis, context):
 
     They turn if that is clearly better than any wall.
     """
-    trial, limit = volumes.copy(), value - FREE_UNITS * scene.evidence
+    trial, limit = volumes.copy(), value - FREE_UNITS * scene.unit
     for _ in range(MOST_TURNS):
         turns, middles = measure_turns(trial, scene, k, context)
         for plane in (2 * axis, 2 * axis + 1):

@@ -82,7 +82,7 @@ def regrow_volumes(
         trial, trial_value = grow_volumes(
             trial, trial_value, ground, candidates, effort, (len(volumes), value)
         )
-        if trial_value < value - REGROWN_UNITS * scene.evidence:
+        if trial_value < value - REGROWN_UNITS * scene.unit:
             volumes, value = trial, trial_value
         k = min(k, len(volumes)) - 1
     return volumes, value

@@ -51,7 +51,7 @@ def improve(volumes, scene, value, slopes, rounds):
                 if value == start:
                     volumes[k, SETTLED] = digest_surroundings(volumes, scene.turn, k)
         volumes, value = drop_base(volumes, scene, value)
-        if value > value_before - 0.05 * scene.evidence:
+        if value > value_before - 0.05 * scene.unit:
             break
     return volumes, value
 

@@ -59,7 +59,7 @@ def settle_move(trial, scene, k, value, reach, context):
     """
     refit(trial, scene, k, context)
     trial_value = compute_objective_with(trial, scene, k, context)
-    if trial_value > value + BEGIN_UNITS * scene.evidence + BEGIN_SHARE * scene.n:
+    if trial_value > value + BEGIN_UNITS * scene.unit + BEGIN_SHARE * scene.n:
         return trial, np.inf
     trial_value = move_edges(trial, scene, k, trial_value, reach, context)
     trial, trial_value = refit_volume(trial, scene, trial_value, k, context)
@@ -165,7 +165,7 @@ def add_planes(volumes, scene, value, k, slopes, context):
         if volumes[k, OFFSET0 + plane] < np.inf or seeds[plane] < FEWEST_SEEDS:
             continue
         trial_slopes = list_trial_slopes(volumes[k], plane, slopes)
-        least_gain = 0.6 * scene.evidence * UNKNOWN_UNITS
+        least_gain = 0.6 * scene.unit * UNKNOWN_UNITS
         gain, slope, offset = find_best_plane(
             volumes,
             scene,

@@ -3,7 +3,7 @@
     sum over points of min((max(|dz| - dead, 0) / width)^2, 1)
     + sum over unobserved cells of their weight, where the roof leaves the points' range of heights,
       and a little where it is high although no point was seen around: what is hidden is lower
-    + evidence * (volumes + offsets + slopes + edges on lines of their own)
+    + unit * (volumes + offsets + slopes + edges on lines of their own)
 
 What is seen of edges is priced by `fit.roof`, which draws them.
 """
@@ -79,12 +79,12 @@ def compute_roof_cost(volumes, scene, z):
     """Compute the cost of a roof with heights `z` (n + g,)."""
     total, bare, base = compute_costs(z, scene).sum(), 0.0, volumes[0, OFFSET0 + LEVEL]
     for k in range(1, len(volumes)):
-        total += scene.evidence * price_volume(volumes[k])
+        total += scene.unit * price_volume(volumes[k])
     for i in range(scene.n, len(z)):
         if z[i] == base:
             bare += scene.weight[i]
     if bare > BASE_SHARE * scene.n:
-        total += scene.evidence * BASE_COST
+        total += scene.unit * BASE_COST
     return total + price_loose_edges(volumes, scene)
 
 
@@ -95,7 +95,7 @@ def price_loose_edges(volumes, scene):
     for k in range(1, len(volumes)):
         for edge in range(4):
             count += is_loose(volumes, scene, k, edge)
-    return scene.evidence * LOOSE_COST * count
+    return scene.unit * LOOSE_COST * count
 
 
 @compiled

@@ -2,8 +2,7 @@
 
 Everything is in the building's frame: u, v (m) along its two main directions, z (m) about the
 median height. A plane is (a, b, c) with z = a u + b v + c. The cost of a point is min((dz / tau)^2,
-1): evidence is counted in points, and a point that no plane explains costs one. Complexity has a
-price in the same currency, `evidence` points a unit.
+1): a point that no plane explains costs one. A unit of structure costs `unit` points.
 """
 
 from __future__ import annotations
@@ -131,7 +130,7 @@ def step_biweight(cloud, members, plane, scale, mask, centre_u, centre_v):
 
 
 @compiled
-def fit_plane(cloud, members, start, tau, evidence):
+def fit_plane(cloud, members, start, tau, unit):
     """Fit the best of a level, two axis-sloped and a free plane near `start`.
 
     It has the lowest truncated cost plus complexity.
@@ -143,7 +142,7 @@ def fit_plane(cloud, members, start, tau, evidence):
         centre_v += cloud.v[i] / n
     start_kind = classify_plane(start)
     best = start.copy()
-    best_cost = sum_plane_cost(cloud, members, start, tau) + evidence * KIND_COST[start_kind]
+    best_cost = sum_plane_cost(cloud, members, start, tau) + unit * KIND_COST[start_kind]
     mask = np.ones(3, np.bool_)
     for kind in range(4):
         mask[0], mask[1] = kind == 1 or kind == 3, kind >= 2
@@ -157,7 +156,7 @@ def fit_plane(cloud, members, start, tau, evidence):
                 break
         if not ok or plane[0] ** 2 + plane[1] ** 2 > MAX_SLOPE**2:
             continue
-        cost = sum_plane_cost(cloud, members, plane, tau) + evidence * KIND_COST[kind]
+        cost = sum_plane_cost(cloud, members, plane, tau) + unit * KIND_COST[kind]
         if cost < best_cost:
             best_cost, best = cost, plane
     return best, best_cost
@@ -457,7 +456,7 @@ def lower_costs(cloud, members, planes, tau, current):
 
 
 @compiled
-def pool_planes(cloud, grid, candidates, tau, evidence, most_planes):
+def pool_planes(cloud, grid, candidates, tau, unit, most_planes):
     """Pool planes (k, 3) greedily, each refitted over its best rectangle.
 
     It ends when little is gained.
@@ -470,12 +469,12 @@ def pool_planes(cloud, grid, candidates, tau, evidence, most_planes):
     pool = np.zeros((most_planes, 3))
     for k in range(most_planes):
         _, m, rectangle = find_best_candidate(
-            cloud, stacked, counts, bounds, current, tau, 1.5 * evidence, gain
+            cloud, stacked, counts, bounds, current, tau, 1.5 * unit, gain
         )
         if m < 0:
             return pool[:k]
         members = select_members(cloud, rectangle)
-        plane, _ = fit_plane(cloud, members, candidates[m], tau, evidence)
+        plane, _ = fit_plane(cloud, members, candidates[m], tau, unit)
         copy_row(pool[k], plane)
         lower_costs(cloud, members, plane.reshape((1, 3)), tau, current)
         lower_costs(cloud, members, stacked[m], tau, current)
@@ -612,7 +611,7 @@ def fit_whole_roofs(cloud, grid, tau):
 
 
 @compiled
-def pool_gables(cloud, grid, pool, tau, evidence):
+def pool_gables(cloud, grid, pool, tau, unit):
     """Pool symmetric gables, pyramids and hips (k, PART_PLANES, 3) greedily.
 
     Also returns their counts of planes.
@@ -627,7 +626,7 @@ def pool_gables(cloud, grid, pool, tau, evidence):
     gables, gable_counts = np.zeros((MOST_GABLES, PART_PLANES, 3)), np.zeros(MOST_GABLES, np.int64)
     for k in range(MOST_GABLES):
         _, m, rectangle = find_best_candidate(
-            cloud, candidates, counts, bounds, current, tau, 1.5 * evidence, gain
+            cloud, candidates, counts, bounds, current, tau, 1.5 * unit, gain
         )
         if m < 0:
             return gables[:k], gable_counts[:k]

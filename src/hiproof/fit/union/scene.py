@@ -38,7 +38,7 @@ WALL_M = 2.0  # Shortest length (m) of such a wall.
 Scene = namedtuple(
     "Scene",
     "U V order z weight shade n low high turn depth corner_u corner_v pitch lines vertices leans "
-    "evidence dead width allowed",
+    "unit dead width allowed",
 )
 """A building as the search sees it.
 
@@ -54,7 +54,7 @@ Scene = namedtuple(
   (corner_u, corner_v) with a node every `pitch` metres.
 - lines, vertices: places for an edge, by direction and axis, padded with infinity.
 - leans (directions, 2, m): of walls not quite along an axis, x = offset + lean y, padded.
-- evidence: the points that a unit of structure must explain.
+- unit: the points that a unit of structure must explain.
 - dead, width: a point costs min((max(|dz| - dead, 0) / width)^2, 1).
 - allowed (2, 3, 3, 2): the shapes that a volume may have, see `volumes.is_allowed`.
 """
@@ -95,7 +95,7 @@ def make_scene(
     plan: Plan,
     outline: shapely.Polygon,
     angles: list[float],
-    evidence: float,
+    unit: float,
     tolerance_m: float,
     allowed: np.ndarray,
 ) -> Scene:
@@ -130,26 +130,26 @@ def make_scene(
         make_lines(plan, corners),
         list_vertices(corners),
         list_leans(corners),
-        evidence,
+        unit,
         DEAD_M,
         max(tolerance_m - DEAD_M, LEAST_RAMP_M),
         allowed,
     )
 
 
-def thin_scene(scene: Scene, numbers: np.ndarray, evidence: float) -> Scene:
+def thin_scene(scene: Scene, numbers: np.ndarray, unit: float) -> Scene:
     """Return the scene with only the points `numbers` (m,).
 
     Unobserved cells weigh as many of them. What comes from the outline is shared.
     """
     if len(numbers) == scene.n:
-        return scene._replace(evidence=evidence)
+        return scene._replace(unit=unit)
     thinned = select_points(scene, np.append(numbers, np.arange(scene.n, len(scene.z))))
     thinned.weight[thinned.n :] *= thinned.n / scene.n
     return thinned._replace(
         order=sort_along(thinned.U, thinned.V),
         shade=thinned.shade * (thinned.n / scene.n),
-        evidence=evidence,
+        unit=unit,
     )
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from ..prices import LARGE_ROOF_M2, compute_unit_points
+from ..prices import compute_unit
 from .allowed import list_allowed_shapes
 from .blocks import HeightRaster
 from .grow import grow
@@ -22,6 +22,7 @@ from .volumes import make_base
 from .whole import Whole
 
 SEARCH_POINTS = 600  # Points in which structure is searched.
+LARGE_ROOF_M2 = 200.0  # Area (m2) from which on a roof is searched block by block.
 
 
 def lay_out_whole(
@@ -32,9 +33,9 @@ def lay_out_whole(
     `settings` are those of [compound]. Volumes have only shapes that parts of `types` need, any
     without types.
     """
-    evidence = compute_unit_points(plan.density, outline.area, settings)
+    unit = compute_unit(plan.density, settings)
     angles, allowed = find_directions(outline, plan), list_allowed_shapes(types)
-    scene = make_scene(plan, outline, angles, evidence, settings.tolerance_m, allowed)
+    scene = make_scene(plan, outline, angles, unit, settings.tolerance_m, allowed)
     return Whole(scene, plan, outline)
 
 
@@ -46,7 +47,7 @@ def find_volumes(whole: Whole, settings) -> np.ndarray:
         return np.concatenate(blocks or [make_base(float(whole.z.min()))])
     numbers = np.arange(min(count, SEARCH_POINTS)) * count // min(count, SEARCH_POINTS)
     density = whole.plan.density * len(numbers) / count
-    thinned = thin_scene(scene, numbers, compute_unit_points(density, whole.area, settings))
+    thinned = thin_scene(scene, numbers, compute_unit(density, settings))
     volumes, _ = grow(thinned)
     volumes, value = refit_volumes(volumes, scene, compute_objective(volumes, scene))
     volumes, _ = trim(volumes, scene, value)

@@ -69,7 +69,7 @@ def draw_out(volumes: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarra
         trial = volumes.copy()
         trial[k, U0 + edge] += OUTWARDS[edge % 2] * nearest[k, edge]
         trial_value = compute_objective(trial, scene)
-        if trial_value <= value + SLACK_UNITS * scene.evidence:
+        if trial_value <= value + SLACK_UNITS * scene.unit:
             volumes, value = trial, trial_value
     return volumes, value
 

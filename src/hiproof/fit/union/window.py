@@ -67,7 +67,7 @@ def open_window(whole: Whole, box: Box, most_points: int) -> Scene | None:
         lines=pad_rows(lines),
         vertices=list_vertices(corners),
         leans=list_leans(corners),
-        evidence=share * scene.evidence,
+        unit=share * scene.unit,
     )
 
 
