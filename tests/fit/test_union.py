@@ -208,7 +208,7 @@ def test_uneven_teeth_stay_uneven():
     ("half_width", "depth", "top", "parts"),
     [
         (0.9, 2.0, 8.0, {"main": 1, "full": 2, "fine": 2}),
-        (0.6, 1.0, 6.9, {"main": 1, "full": 1, "fine": 2}),
+        (0.4, 0.8, 6.8, {"main": 1, "full": 1, "fine": 2}),
     ],
 )
 def test_detail_says_how_small_a_dormer_may_be(half_width, depth, top, parts):
