@@ -36,7 +36,7 @@ LOW_STEP_UNITS = 0.23  # A metre of a step lower than half a metre.
 NARROW_M = 1.0  # Nobody draws what is narrower (m).
 LACK_UNITS = 4.0  # A m2 that a volume lacks to be as wide: what its points would explain.
 GIVEN_UNITS = 1.0  # The same between two lines of the outline.
-NARROW_UNITS = 0.4  # A metre of a step beside a narrower strip, unless it runs along a wall.
+NARROW_UNITS = 0.6  # A metre of a step beside a narrower strip, unless it runs along a wall.
 
 # Where a side of a volume of the search begins: along no line of the outline, between two of its
 # corners, each metre off.
