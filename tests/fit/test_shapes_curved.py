@@ -118,12 +118,13 @@ def test_facets_over_an_arc_stand_on_its_sides(kind):
 def test_an_onion_on_a_tower_is_as_high_as_it_is():
     """Its middle and its width follow from all points on it, and the needle from those.
 
-    Of 40 seeds, the type is right in 35, and the height within 0.2 m too in 29.
+    Of 40 seeds, the type is right in 35, and the height within 0.2 m too in 29: two standard
+    deviations less are asked of 12.
     """
-    outcomes = [judge_scene(draw_scene("onion", "tower", seed, 8.0)) for seed in range(4)]
-    assert sum(outcome.is_right for outcome in outcomes) >= 3
+    outcomes = [judge_scene(draw_scene("onion", "tower", seed, 8.0)) for seed in range(12)]
+    assert sum(outcome.is_right for outcome in outcomes) >= 8
     near = [outcome.is_right and abs(outcome.height_error_m) <= 0.2 for outcome in outcomes]
-    assert sum(near) >= 2
+    assert sum(near) >= 5
 
 
 def test_an_onion_is_found_around_what_looks_like_a_spire():

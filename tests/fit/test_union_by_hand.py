@@ -133,6 +133,21 @@ ROOFS = {
 }
 
 
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("name", ["slopes back to back with a step between", "a clerestory"])
+def test_slopes_with_a_step_between_are_two_monopitches(name, seed):
+    """One of them could be drawn as the end of a gable of the other, and a piece of the rest."""
+    parts = ROOFS[name]
+    outline = shapely.union_all([rectangle for rectangle, _ in parts])
+
+    def z(x, y):
+        return np.where(y < 5.0, *(height(x, y) for _, height in parts))
+
+    result = fit_building(sample_heights(z, outline, seed=seed), outline).roof_parts
+    assert [part.type for part in result] == ["monopitch", "monopitch"]
+    assert [part.parameters["width"] for part in result] == pytest.approx([5.0, 5.0], abs=0.05)
+
+
 @pytest.mark.parametrize("name", ROOFS)
 def test_a_roof_by_hand_is_the_parts_a_person_sees(name):
     parts, turn = ROOFS[name], 0.4 + len(name)

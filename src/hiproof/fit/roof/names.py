@@ -84,7 +84,9 @@ def read_sides(
 def cut_sides(
     sides: list[Side], corners: np.ndarray, axes: np.ndarray, outline: shapely.Polygon
 ) -> list[Side]:
-    """Return sides of which those beyond the `corners` (n, 2) of a place end there.
+    """Return sides of which those that the `corners` (n, 2) of a place do not reach end there.
+
+    So do straight ones beyond which the place goes on.
 
     Nothing determines the places of these ends but the outline, where they lie on it.
     """
@@ -95,7 +97,8 @@ def cut_sides(
     cut = list(sides)
     for k, (side, end) in enumerate(zip(sides, ends, strict=True)):
         place = side.offset + side.lean * corners[:, 1 - k // 2].mean()
-        if (1 if k % 2 else -1) * (end - place) <= -GIVEN_M:
+        beyond = (1 if k % 2 else -1) * (end - place)
+        if beyond <= -GIVEN_M or (beyond >= GIVEN_M and side.lean == 0.0):
             is_end = np.abs(corners[:, k // 2] - end) < GIVEN_M
             cut[k] = Side(float(end), 0.0, True, 0.0 if is_given[is_end].all() else math.inf)
     return cut

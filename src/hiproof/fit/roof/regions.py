@@ -93,8 +93,17 @@ def end_at_others(
             same = np.argwhere(drawing.numbers[: len(regions)] == drawing.numbers[k, p])
             others = [(j, q) for j, q in same.tolist() if j != k and q in planes[j]]
             is_of_side = abs(roof.plane_lines[k, p]) in np.abs(roof.sides[k])
-            may_end = others and not is_of_side if len(seen) else len(planes[k]) > 2
-            if not may_end or len(planes[k]) == 1:
+            if len(planes[k]) == 1:
+                continue
+            if len(seen) and (taker := find_taker(roof, k, p, regions, planes, others)):
+                j, wide = taker
+                regions[j] = list_polygons(wide)
+                regions[k] = list_polygons(subtract(unite(regions[k]), wide))
+                planes[k].remove(p)
+                ended |= {j, k}
+                owners[seen] = j, planes[j][0]
+                continue
+            if not (others and not is_of_side if len(seen) else len(planes[k]) > 2):
                 continue
             shown = unite([area for j, q in others for area in draw_lowest(roof, j, q, regions[j])])
             own = draw_lowest(roof, k, p, regions[k])
@@ -107,6 +116,27 @@ def end_at_others(
                 if len(seen):
                     owners[seen] = others[0]
     return ended
+
+
+def find_taker(
+    roof: Tables,
+    k: int,
+    p: int,
+    regions: list[list[shapely.Polygon]],
+    planes: list[list[int]],
+    others: list[tuple[int, int]],
+) -> tuple[int, shapely.Geometry] | None:
+    """Return a volume of plane p alone that goes on where volume k shows it, and its region then.
+
+    Two slopes back to back, with a step between them, may be drawn as a gable and what is left of
+    one slope. The region is convex: else there is none.
+    """
+    for j, q in others:
+        if planes[j] == [q]:
+            wide = unite([*regions[j], *draw_lowest(roof, k, p, regions[k])])
+            if shapely.convex_hull(wide).area - wide.area <= FRAGMENT_M2:
+                return j, wide
+    return None
 
 
 def cut_square(

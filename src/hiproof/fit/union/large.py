@@ -27,7 +27,8 @@ BLOCK = Effort(pool_points=1200, seeds=200, regrown=1)
 # Largest area of outline in a block (m2). Blocks of 400 m2 cut saw-tooth halls through their teeth
 # (17 of 20 right at 5 points/m2, all with 600), and Vienna has 81.8 % of its edges instead of 83.2.
 BLOCK_M2 = 600.0
-LEAST_HALF_SHARE = 0.3  # Least share of the longer side of a roof on either side of a cut.
+LEAST_HALF_SHARE = 0.3  # Least share of the side of a roof on either side of a cut.
+LEAST_SIDE_SHARE = 0.5  # Least length of a side that is cut, as a share of the longer one.
 
 
 def search_box(whole: Whole, box: Box) -> list[np.ndarray]:
@@ -44,25 +45,28 @@ def find_step(
 ) -> tuple[int, float]:
     """Return the axis across which a box is cut, and where.
 
-    That is the longer one of the `bounds` of its roof, and within the middle of these where heights
-    change most: the squares of heights about their means on both sides have the least sum.
+    Heights change most there, within the middle of the `bounds` of its roof: the squares of heights
+    about their means on both sides fall most. Its shorter side is not cut if it is much shorter.
     """
     west, south, east, north = bounds
-    axis = int(north - south > east - west)
-    low, high = (south, north) if axis else (west, east)
-    margin = LEAST_HALF_SHARE * (high - low)
-    strip = box.split(axis, high - margin)[0].split(axis, low + margin)[1]
-    numbers = whole.find_points(strip)
-    x = (whole.u, whole.v)[axis][numbers]
-    order = np.argsort(x, kind="stable")
-    x, z = x[order], whole.z[numbers[order]]
-    if len(x) < 2:
-        return axis, 0.5 * (low + high)
-    before = np.arange(1, len(x))
-    sums = np.cumsum(z)[:-1]
-    spread = sums**2 / before + (z.sum() - sums) ** 2 / (len(x) - before)
-    q = int(np.argmax(spread))
-    return axis, float(0.5 * (x[q] + x[q + 1]))
+    ranges, longest = ((west, east), (south, north)), max(east - west, north - south)
+    best, steepest = (int(north - south > east - west), 0.0), -1.0
+    for axis, (low, high) in enumerate(ranges):
+        margin = LEAST_HALF_SHARE * (high - low)
+        strip = box.split(axis, high - margin)[0].split(axis, low + margin)[1]
+        numbers = whole.find_points(strip)
+        x = (whole.u, whole.v)[axis][numbers]
+        order = np.argsort(x, kind="stable")
+        x, z = x[order], whole.z[numbers[order]]
+        if high - low < LEAST_SIDE_SHARE * longest or len(x) < 2:
+            continue
+        z = z - z.mean()
+        before = np.arange(1, len(x))
+        fall = np.cumsum(z)[:-1] ** 2 * (1.0 / before + 1.0 / (len(x) - before))
+        q = int(np.argmax(fall))
+        if fall[q] > steepest * len(x):
+            best, steepest = (axis, float(0.5 * (x[q] + x[q + 1]))), fall[q] / len(x)
+    return best if steepest >= 0.0 else (best[0], 0.5 * sum(ranges[best[0]]))
 
 
 def search_block(whole: Whole, box: Box) -> list[np.ndarray]:
