@@ -28,13 +28,14 @@ from .tables import FigureTable, make_parser
 
 STAGES = {
     "find the common shift of footprints": "hiproof.city.plan.prepare.jobs_from_footprints",
-    "make the rest of the plan": "hiproof.city.folder.resume.make_plan",
-    "sort points into tiles": "hiproof.city.work.sort.sort_cloud",
+    "make the rest of the plan": "hiproof.city.run.resume_or_plan",
+    "sort points into tiles": "hiproof.city.run.sort_cloud",
     "load the points of a tile": "hiproof.city.work.solve.load_points",
     "move rows of footprints": "hiproof.city.work.solve.Surroundings.move",
     "gather the points of a building": "hiproof.city.work.solve.Surroundings.select_roof_points",
     "use the points inside the footprint": "hiproof.method.usable",
     "look at the ground inside the footprint": "hiproof.method.look_at_ground",
+    "drop points on neighbours' roofs": "hiproof.method.drop_neighbour_roofs",
     "fit": "hiproof.method.fit",
     "find the ground around": "hiproof.method.find_ground",
     "compose the solid": "hiproof.method.solid_or_simpler",

@@ -8,7 +8,7 @@ from hiproof import reconstruct
 from hiproof.compose import check_solid
 from hiproof.fit.roof import fit_building
 from hiproof.fit.union.allowed import list_allowed_shapes
-from hiproof.fit.union.large import BLOCK_M2, find_step
+from hiproof.fit.union.blocks import BLOCK_M2, HeightRaster, find_cheapest_cut
 from hiproof.fit.union.plan import lay_out_plan
 from hiproof.fit.union.scene import find_directions, make_scene
 from hiproof.fit.union.whole import Whole
@@ -97,13 +97,14 @@ def test_edges_of_a_long_roof_stay_where_its_steps_are():
     assert fit_building(points, outline).unexplained < 0.001
 
 
-def test_a_cut_falls_on_a_step_across_the_longer_side():
+def test_a_cut_falls_on_a_step_and_blocks_are_small():
     outline = shapely.box(-30, 0, 30, 15)
     whole = make_whole(lambda x, y: np.where(x < 8.0, 6.0, 9.0), outline)
-    axis, place = find_step(whole, whole.box, whole.outline.bounds)
+    raster = HeightRaster(whole)
+    axis, positions = find_cheapest_cut(raster, whole.box)
     step = whole.plan.frame.to_plan(np.array([[8.0, 7.5, 6.0]]))[0]
     assert whole.area > BLOCK_M2
-    assert place == pytest.approx(step[axis], abs=0.6)
+    assert positions == pytest.approx(step[axis], abs=2 * raster.pitch)
 
 
 def test_equal_levels_of_a_long_row_are_equal_everywhere():

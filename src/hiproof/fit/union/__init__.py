@@ -23,5 +23,6 @@ search      these in order
 large       roofs of more than 200 m2, each block of which is searched as a house
 whole       what blocks need of a whole roof
 window      the scene of a box
+blocks      where a large roof is cut
 fit         the outcome
 """

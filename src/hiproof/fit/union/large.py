@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .blocks import BLOCK_M2, HeightRaster, find_cheapest_cut
 from .candidates import Effort
 from .grow import grow
 from .moves import refit_volumes
@@ -24,49 +25,40 @@ FULL_POINTS = 3000
 # Growing more than one volume anew gains nothing in blocks and costs a quarter of the time
 # (Vienna's even places at 5 points/m2).
 BLOCK = Effort(pool_points=1200, seeds=200, regrown=1)
-# Largest area of outline in a block (m2). Blocks of 400 m2 cut saw-tooth halls through their teeth
-# (17 of 20 right at 5 points/m2, all with 600), and Vienna has 81.8 % of its edges instead of 83.2.
-BLOCK_M2 = 600.0
-LEAST_HALF_SHARE = 0.3  # Least share of the side of a roof on either side of a cut.
-LEAST_SIDE_SHARE = 0.5  # Least length of a side that is cut, as a share of the longer one.
+LEAST_HALF_M2 = 1.0  # Least area (m2) of outline on either side of a cut.
 
 
-def search_box(whole: Whole, box: Box) -> list[np.ndarray]:
-    """Return the volumes of each block of a box."""
-    part = clip_to_box(whole.outline, box)
-    if part.area <= BLOCK_M2:
+def search_box(whole: Whole, raster: HeightRaster, box: Box, area_m2: float) -> list[np.ndarray]:
+    """Return the volumes of each block of a box that holds so much of the outline."""
+    cut = find_cheapest_cut(raster, box) if area_m2 > BLOCK_M2 else None
+    halves = box.split(cut[0], find_step(whole, box, *cut, raster.pitch)) if cut else (box, box)
+    areas = [clip_to_box(whole.outline, half).area for half in halves]
+    if cut is None or min(areas) < LEAST_HALF_M2:
         return search_block(whole, box)
-    halves = box.split(*find_step(whole, box, part.bounds))
-    return [block for half in halves for block in search_box(whole, half)]
+    return [
+        block
+        for half, area in zip(halves, areas, strict=True)
+        for block in search_box(whole, raster, half, area)
+    ]
 
 
-def find_step(
-    whole: Whole, box: Box, bounds: tuple[float, float, float, float]
-) -> tuple[int, float]:
-    """Return the axis across which a box is cut, and where.
+def find_step(whole: Whole, box: Box, axis: int, place: float, pitch: float) -> float:
+    """Return where within two cells of a cut, at a `place` of an axis, heights change most.
 
-    Heights change most there, within the middle of the `bounds` of its roof: the squares of heights
-    about their means on both sides fall most. Its shorter side is not cut if it is much shorter.
+    The squares of heights about their means on both sides have the least sum there.
     """
-    west, south, east, north = bounds
-    ranges, longest = ((west, east), (south, north)), max(east - west, north - south)
-    best, steepest = (int(north - south > east - west), 0.0), -1.0
-    for axis, (low, high) in enumerate(ranges):
-        margin = LEAST_HALF_SHARE * (high - low)
-        strip = box.split(axis, high - margin)[0].split(axis, low + margin)[1]
-        numbers = whole.find_points(strip)
-        x = (whole.u, whole.v)[axis][numbers]
-        order = np.argsort(x, kind="stable")
-        x, z = x[order], whole.z[numbers[order]]
-        if high - low < LEAST_SIDE_SHARE * longest or len(x) < 2:
-            continue
-        z = z - z.mean()
-        before = np.arange(1, len(x))
-        fall = np.cumsum(z)[:-1] ** 2 * (1.0 / before + 1.0 / (len(x) - before))
-        q = int(np.argmax(fall))
-        if fall[q] > steepest * len(x):
-            best, steepest = (axis, float(0.5 * (x[q] + x[q + 1]))), fall[q] / len(x)
-    return best if steepest >= 0.0 else (best[0], 0.5 * sum(ranges[best[0]]))
+    strip = box.split(axis, place + 2 * pitch)[0].split(axis, place - 2 * pitch)[1]
+    numbers = whole.find_points(strip)
+    x = (whole.u, whole.v)[axis][numbers]
+    order = np.argsort(x, kind="stable")
+    x, z = x[order], whole.z[numbers[order]]
+    if len(x) < 2:
+        return place
+    before = np.arange(1, len(x))
+    sums = np.cumsum(z)[:-1]
+    spread = sums**2 / before + (z.sum() - sums) ** 2 / (len(x) - before)
+    q = int(np.argmax(spread))
+    return float(0.5 * (x[q] + x[q + 1]))
 
 
 def search_block(whole: Whole, box: Box) -> list[np.ndarray]:

@@ -10,6 +10,7 @@ import shapely
 
 from ..prices import compute_unit
 from .allowed import list_allowed_shapes
+from .blocks import HeightRaster
 from .grow import grow
 from .large import search_box
 from .moves import refit_volumes
@@ -42,7 +43,7 @@ def find_volumes(whole: Whole, settings) -> np.ndarray:
     """Find the volumes (k, COLUMNS) of a roof. `settings` are those of [compound]."""
     scene, count = whole.scene, whole.scene.n
     if whole.area > LARGE_ROOF_M2 and count > SEARCH_POINTS:
-        blocks = search_box(whole, whole.box)
+        blocks = search_box(whole, HeightRaster(whole), whole.box, whole.area)
         return np.concatenate(blocks or [make_base(float(whole.z.min()))])
     numbers = np.arange(min(count, SEARCH_POINTS)) * count // min(count, SEARCH_POINTS)
     density = whole.plan.density * len(numbers) / count
