@@ -51,9 +51,9 @@ def test_a_curved_roof_is_found(kind, setting):
 def test_a_pointed_roof_over_a_polygon_has_a_facet_over_each_wall():
     """Of 7 to 16 unequal walls, at 8 points/m2: 80 of 80 other seeds."""
     found = 0
-    for seed in range(5):
+    for seed in range(10):
         rng = np.random.default_rng([seed, 11])
-        sides, radius = 7 + 2 * seed, rng.uniform(2.5, 6.0)
+        sides, radius = 7 + seed % 10, rng.uniform(2.5, 6.0)
         turns = (np.arange(sides) + rng.uniform(-0.15, 0.15, sides)) * 2.0 * np.pi / sides
         rim = radius * np.column_stack([np.cos(turns), np.sin(turns)])
         way, outline = np.roll(rim, -1, axis=0) - rim, shapely.Polygon(rim)
@@ -66,7 +66,7 @@ def test_a_pointed_roof_over_a_polygon_has_a_facet_over_each_wall():
         parts = fit_building(np.column_stack([xy, z]), outline).roof_parts
         solid = compose(Roof(parts, outline, LocalFrame(np.zeros(3))), 0.0)
         found += len(solid.select_faces(ROOF)) == sides
-    assert found >= 4
+    assert found >= 9
 
 
 def test_a_cone_is_no_onion_of_any_width():
@@ -118,13 +118,12 @@ def test_facets_over_an_arc_stand_on_its_sides(kind):
 def test_an_onion_on_a_tower_is_as_high_as_it_is():
     """Its middle and its width follow from all points on it, and the needle from those.
 
-    Of 40 seeds, the type is right in 35, and the height within 0.2 m too in 29: two standard
-    deviations less are asked of 12.
+    Of 40 seeds, the type is right in 35, and the height within 0.2 m too in 29.
     """
     outcomes = [judge_scene(draw_scene("onion", "tower", seed, 8.0)) for seed in range(12)]
     assert sum(outcome.is_right for outcome in outcomes) >= 8
     near = [outcome.is_right and abs(outcome.height_error_m) <= 0.2 for outcome in outcomes]
-    assert sum(near) >= 5
+    assert sum(near) >= 6
 
 
 def test_an_onion_is_found_around_what_looks_like_a_spire():
@@ -276,7 +275,7 @@ REFITTED = [
 
 def test_a_refit_of_an_untouched_building_stays_near_its_fit():
     """Of 40 seeds of each kind, 270 of 280 do."""
-    near = [is_refit_near(kind, setting, seed) for kind, setting in REFITTED for seed in range(1)]
+    near = [is_refit_near(kind, setting, 0) for kind, setting in REFITTED]
     assert sum(near) >= 6
 
 
@@ -294,7 +293,7 @@ def is_refit_near(kind, setting, seed):
 MEASURED = [
     ("onion", "alone"),
     ("cone", "turret"),
-    ("hexagonal_spire", "alone"),
+    ("hexagonal_spire", "tower"),
     ("barrel", "alone"),
 ]
 

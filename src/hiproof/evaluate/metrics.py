@@ -13,7 +13,7 @@ from ..geometry.grid import number_cells
 from ..geometry.point_in_polygon import find_inside
 from ..geometry.rings import unite
 from ..model import ROOF, Fit, Quality, Solid
-from .distance import point_surface_distances, vertical_distances
+from .distance import make_polygon, point_surface_distances, vertical_distances
 
 # A point within this vertical distance of the roof counts as explained well (the field's share
 # within 20 cm).
@@ -58,12 +58,7 @@ def roof_polygons(model: Solid | Fit | Polygons) -> list[list[np.ndarray]]:
 
 def plan_outline(model: Solid | Fit | Polygons) -> shapely.Geometry:
     """Return the union of a model's roof surfaces in plan, empty without any."""
-    polygons = [
-        shapely.polygons(
-            outer[:, :2], holes=[shapely.linearrings(hole[:, :2]) for hole in holes] or None
-        )
-        for outer, *holes in roof_polygons(model)
-    ]
+    polygons = [make_polygon(rings) for rings in roof_polygons(model)]
     polygons = [p if p.is_valid else p.buffer(0) for p in polygons]
     return unite(polygons)
 

@@ -86,9 +86,8 @@ def cut_sides(
 ) -> list[Side]:
     """Return sides of which those that the `corners` (n, 2) of a place do not reach end there.
 
-    So do straight ones beyond which the place goes on.
-
-    Nothing determines the places of these ends but the outline, where they lie on it.
+    So do straight ones beyond which the place goes on. Nothing determines the places of these ends
+    but the outline, where they lie on it.
     """
     is_given = shapely.dwithin(shapely.points(corners), outline.boundary, GIVEN_M)
     corners = corners @ axes.T

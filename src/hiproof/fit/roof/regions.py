@@ -89,12 +89,11 @@ def end_at_others(
     ended, owners = set(), drawing.owners[: drawing.count[0]]
     for k in range(len(regions)):
         for p in reversed(planes[k]):
+            if len(planes[k]) == 1:
+                break
             seen = np.flatnonzero((owners == (k, p)).all(axis=1))
             same = np.argwhere(drawing.numbers[: len(regions)] == drawing.numbers[k, p])
             others = [(j, q) for j, q in same.tolist() if j != k and q in planes[j]]
-            is_of_side = abs(roof.plane_lines[k, p]) in np.abs(roof.sides[k])
-            if len(planes[k]) == 1:
-                continue
             if len(seen) and (taker := find_taker(roof, k, p, regions, planes, others)):
                 j, wide = taker
                 regions[j] = list_polygons(wide)
@@ -103,7 +102,9 @@ def end_at_others(
                 ended |= {j, k}
                 owners[seen] = j, planes[j][0]
                 continue
-            if not (others and not is_of_side if len(seen) else len(planes[k]) > 2):
+            is_of_side = abs(roof.plane_lines[k, p]) in np.abs(roof.sides[k])
+            may_end = others and not is_of_side if len(seen) else len(planes[k]) > 2
+            if not may_end:
                 continue
             shown = unite([area for j, q in others for area in draw_lowest(roof, j, q, regions[j])])
             own = draw_lowest(roof, k, p, regions[k])
