@@ -90,7 +90,7 @@ def test_an_eave_along_corners_of_the_outline_is_level_between_them(kind):
         solid = compose(Roof((part,), outline, LocalFrame(np.zeros(3))), 0.0)
         vertices = solid.vertices[solid.vertices[:, 2] > 3.0]
         on_rim = shapely.dwithin(outline.exterior, shapely.points(vertices), 1e-3)
-        on_wall = np.abs(vertices[:, 0]) < 1e-3 if kind == "half_cone" else False
+        on_wall = (np.abs(vertices[:, 0]) < 1e-3) & (kind == "half_cone")
         assert np.count_nonzero(on_rim) >= sides
         assert vertices[on_rim & ~on_wall, 2] == pytest.approx(6.0, abs=1e-3), sides
 

@@ -8,12 +8,12 @@ solid             `compose`: the steps below, one after the other; terrain inter
 cells             outline, pieces and the lines where the active plane changes as one plan of cells
 arrangement       the planar arrangement under them, on an integer grid
 levels            which heights meet over every vertex of the plan
-shell             roof, wall and ground faces that share them
+lids              walls that close a solid between its other faces
+shell             roof faces over the cells, and the solid under them
 check             whether the result is valid by ISO 19107
 check_faces       its rules for each face by itself
 simpler           parts given up one by one, where a roof cannot become a valid solid
 blocks            LoD1: prisms over the outline; installations on roofs
-lids              walls that close a solid between its other faces
 underside         walls down to the terrain, and passages below a solid
 overhang          slabs of a roof beyond walls
 eaves             a model with overhangs, as many as make a valid solid

@@ -232,13 +232,12 @@ def find_previous(owner: np.ndarray) -> np.ndarray:
 
 
 class HalfEdges(NamedTuple):
-    """Half-edges (2e,) by origin, `follow` around each `face` on the left; face 0 is unbounded.
+    """Half-edges (2e,) by origin, and the `face` on the left of each; face 0 is unbounded.
 
     The others are `polygons` (f - 1,).
     """
 
     order: np.ndarray
-    follow: np.ndarray
     face: np.ndarray
     polygons: np.ndarray
 
@@ -251,8 +250,6 @@ def trace_faces(xy: np.ndarray, edges: np.ndarray) -> HalfEdges:
     origin, end = edges.ravel(), edges[:, ::-1].ravel()
     dx, dy = (xy[end] - xy[origin]).T
     order = np.lexsort((np.arctan2(dy, dx), origin))
-    follow = np.empty_like(order)
-    follow[order ^ 1] = order[find_previous(origin[order])]
     lines = shapely.linestrings(xy[edges].astype(float))
     polygons = shapely.orient_polygons(shapely.get_parts(shapely.polygonize(lines)))
     rings, owner = shapely.get_rings(polygons, return_index=True)
@@ -262,7 +259,7 @@ def trace_faces(xy: np.ndarray, edges: np.ndarray) -> HalfEdges:
     keys = (starts * len(xy) + ends)[ring[:-1] == ring[1:]]
     face = np.zeros(len(origin), np.int64)
     face[look_up(origin * len(xy) + end, keys)] = owner[ring[:-1][ring[:-1] == ring[1:]]] + 1
-    return HalfEdges(order, follow, face, polygons)
+    return HalfEdges(order, face, polygons)
 
 
 def look_up(keys: np.ndarray, wanted: np.ndarray) -> np.ndarray:

@@ -19,7 +19,7 @@ from ..geometry.components import label_components
 from ..model import GROUND, ROOF, Solid
 from .arrangement import GRID_M
 from .check import check_solid
-from .lids import Edge, Lid, Place, close_lids, list_edges, list_lids, trace_loops
+from .lids import Edge, Lid, Place, close_lids, draw_base, draw_plan, list_edges, list_lids
 
 # Of a part in plan; a smaller one (a chimney, a box on a roof) stays with the neighbour it borders
 # most.
@@ -101,8 +101,7 @@ def group_roofs(roofs: list[Lid]) -> list[set[int]]:
 
 def measure_area(lid: Lid) -> float:
     """Return the area of a lid in plan, in square metres."""
-    outer, *holes = ([corner[:2] for corner in ring] for ring in lid.rings)
-    return shapely.Polygon(outer, holes).area * GRID_M**2
+    return draw_plan(lid).area * GRID_M**2
 
 
 def merge_small(group_of: list[int], area: list[float], borders: Borders) -> list[set[int]]:
@@ -126,17 +125,10 @@ def merge_small(group_of: list[int], area: list[float], borders: Borders) -> lis
 
 def make_part(roofs: list[Lid], z_base: int) -> BuildingPart:
     """Return the part under `roofs`, with steps, walls to the ground, and ground."""
-    rings = trace_loops(
-        (end[:2], start[:2])
-        for lid in roofs
-        for ring in lid.rings
-        for start, end in list_edges(ring)
-    )
-    rings.sort(key=lambda ring: -shapely.Polygon(ring).area)
-    ground = Lid([[(*place, z_base) for place in ring] for ring in rings], GROUND)
-    outer, *holes = (np.array(ring) * GRID_M for ring in rings)
+    ground = draw_base(roofs, z_base)
     area: dict[int, float] = {}
     for lid in roofs:
         area[lid.part] = area.get(lid.part, 0.0) + measure_area(lid)
     members = tuple(sorted(area, key=lambda part: (-area[part], part)))
-    return BuildingPart(close_lids([*roofs, ground]), shapely.Polygon(outer, holes), members)
+    outline = shapely.transform(draw_plan(ground), lambda xy: xy * GRID_M)
+    return BuildingPart(close_lids([*roofs, ground]), outline, members)

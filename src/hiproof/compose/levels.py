@@ -92,13 +92,13 @@ class Levels(NamedTuple):
     """The levels of a plan: 3D `vertices` (m, 3) in grid units.
 
     `level` (2e,) is the vertex over each half-edge's origin at the height of the cell on its left.
-    Vertices over one plan vertex are numbered upwards without gaps. `order`, `follow` and `face`
+    Vertices over one plan vertex are numbered upwards without gaps. `order`, `face` and `polygons`
     are those of the half-edges.
     """
 
     order: np.ndarray
-    follow: np.ndarray
     face: np.ndarray
+    polygons: np.ndarray
     level: np.ndarray
     vertices: np.ndarray
 
@@ -112,7 +112,7 @@ def stack_levels(
     ties: list[tuple[int, float, float]],
 ) -> Levels:
     """Stack levels over every plan vertex, in grid units."""
-    order, follow, face, _ = trace_faces(xy, edges)
+    order, face, polygons = trace_faces(xy, edges)
     label, origin = side.ravel(), edges.ravel()
     z = np.where(label == OUTSIDE, z_ground, heights(planes[label], *xy[origin].T))
     ranking = np.lexsort((z, origin))
@@ -124,7 +124,7 @@ def stack_levels(
     level[ranking] = np.append(0, np.cumsum(is_top))
     first, last = np.flatnonzero(np.append(True, is_top)), np.flatnonzero(np.append(is_top, True))
     middle = np.rint(0.5 * (z[first] + z[last]))
-    return Levels(order, follow, face, level, np.column_stack([xy[at[first]], middle]))
+    return Levels(order, face, polygons, level, np.column_stack([xy[at[first]], middle]))
 
 
 def find_saddles(edges: np.ndarray, levels: Levels, label: np.ndarray) -> np.ndarray:

@@ -7,16 +7,15 @@ face, and lids get a corner only where a wall has one. Coordinates are whole ten
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
+import shapely
 
 from ..geometry.components import label_components
-from ..geometry.rings import list_between
-from ..model import WALL, Face, Solid
+from ..model import GROUND, WALL, Face, Solid
 from .arrangement import COLLINEAR_UNITS, GRID_M
 
 Item = TypeVar("Item")
@@ -82,6 +81,44 @@ def list_lids(solid: Solid, kind: str) -> list[Lid]:
     ]
 
 
+def draw_plan(lid: Lid) -> shapely.Polygon:
+    """Return a lid in plan, on the grid."""
+    outer, *holes = ([corner[:2] for corner in ring] for ring in lid.rings)
+    return shapely.Polygon(outer, holes)
+
+
+def draw_base(roofs: Sequence[Lid], z_base: int) -> Lid:
+    """Return the level ground under `roofs`, with a corner under each of theirs on its border."""
+    rings = trace_loops(
+        (end[:2], start[:2])
+        for lid in roofs
+        for ring in lid.rings
+        for start, end in list_edges(ring)
+    )
+    rings.sort(key=lambda ring: -shapely.Polygon(ring).area)
+    return Lid([[(*place, z_base) for place in ring] for ring in rings], GROUND)
+
+
+def join_straight_edges(base: Lid) -> Lid:
+    """Return a level lid without the corners on straight stretches of its rings."""
+    rings = []
+    for ring in base.rings:
+        first = ring.index(min(ring))  # which is no corner on a straight stretch
+        line = shapely.linearrings([corner[:2] for corner in ring[first:] + ring[:first]])
+        xy = shapely.get_coordinates(shapely.simplify(line, COLLINEAR_UNITS))[:-1]
+        rings.append([(x, y, ring[0][2]) for x, y in xy.astype(int).tolist()])
+    return base._replace(rings=rings)
+
+
+def list_rings(polygon: shapely.Polygon) -> list[list[Place]]:
+    """Return the rings of a polygon on the grid, its area on their left."""
+    polygon = shapely.orient_polygons(polygon)
+    return [
+        [(x, y) for x, y in np.rint(shapely.get_coordinates(ring)[:-1]).astype(int).tolist()]
+        for ring in (polygon.exterior, *polygon.interiors)
+    ]
+
+
 def list_places(lids: Iterable[Lid]) -> np.ndarray:
     """Return the places (n, 2) over which lids have corners."""
     return np.array(sorted({c[:2] for lid in lids for ring in lid.rings for c in ring}))
@@ -99,21 +136,28 @@ def divide_edges(
 
     A place lies on the edges within the `reach` that are nearest to it.
     """
-    edges, nearest = list(edges), np.full(len(places), np.inf)
-    found = {}
-    for low, high in {(min(edge), max(edge)) for edge in edges}:
-        on = list_between(low[:2], high[:2], places, reach, 0.5)
-        (dx, dy), (x, y) = np.subtract(high[:2], low[:2]), (places[on] - low[:2]).T
-        aside = np.abs(dx * y - dy * x) / max(math.hypot(dx, dy), 1.0)
-        nearest[on] = np.minimum(nearest[on], aside)
-        found[low, high] = on, aside
-    chains: dict[Edge, list[Corner]] = {}
-    for (low, high), (on, aside) in found.items():
-        rise = (high[2] - low[2]) / max(math.dist(low[:2], high[:2]), 1.0)
-        inner = places[on[aside <= nearest[on] + 1.0]].tolist()
-        chain = [(x, y, round(low[2] + rise * math.dist(low[:2], (x, y)))) for x, y in inner]
-        chains[low, high] = [low, *chain, high]
-        chains[high, low] = chains[low, high][::-1]
+    edges = list(edges)
+    risen = list(dict.fromkeys((min(edge), max(edge)) for edge in edges))
+    low, high = np.array(risen, float).swapaxes(0, 1)
+    lines = shapely.linestrings(np.stack([low, high], axis=1)[:, :, :2])
+    tree = shapely.STRtree(shapely.points(places))
+    number, place = tree.query(lines, predicate="dwithin", distance=reach)
+    (dx, dy, rise), (x, y) = (high - low)[number].T, (places[place] - low[number, :2]).T
+    length = np.maximum(np.hypot(dx, dy), 1.0)
+    along, aside = (dx * x + dy * y) / length, np.abs(dx * y - dy * x) / length
+    nearest = np.full(len(places), np.inf)
+    is_inner = (along > 0.5) & (along < length - 0.5)
+    np.minimum.at(nearest, place[is_inner], aside[is_inner])
+    z = np.rint(low[number, 2] + rise / length * np.hypot(x, y))
+    inner = list(map(tuple, np.column_stack([places[place], z]).astype(int).tolist()))
+    is_on = is_inner & (aside <= nearest[place] + 1.0)
+    chains: dict[Edge, list[Corner]] = {edge: [edge[0]] for edge in risen}
+    for k in np.argsort(along, kind="stable").tolist():
+        if is_on[k]:
+            chains[risen[number[k]]].append(inner[k])
+    for start, end in risen:
+        chains[start, end].append(end)
+        chains[end, start] = chains[start, end][::-1]
     return {edge: chains[edge] for edge in edges}
 
 

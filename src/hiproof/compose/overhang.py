@@ -28,13 +28,13 @@ from .lids import (
     list_lids,
     list_open_edges,
     list_places,
+    list_rings,
 )
 from .underside import (
     SAME_PLACE_UNITS,
     Cap,
     draw_ground,
     fit_plane,
-    list_rings,
     list_undersides,
     measure_ground,
     node_rings,

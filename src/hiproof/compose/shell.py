@@ -1,18 +1,18 @@
-"""From plan cells to a closed shell: roof faces, walls where levels part, a ground face."""
+"""From plan cells to a closed shell: roof faces over the cells, closed down to a level ground."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
 from ..errors import CompositionError
-from ..model import GROUND, ROOF, WALL, Face, Solid
-from .arrangement import COLLINEAR_UNITS, GRID_M, OUTSIDE, heights
+from ..model import ROOF, Solid
+from .arrangement import GRID_M, OUTSIDE, heights
 from .cells import PlanCells, PlanProblem
 from .levels import Levels, find_saddles, split_at_crossings, stack_levels
+from .lids import Lid, close_lids, draw_base, join_straight_edges, list_rings
 
 SETBACK_M = 0.01  # m that a crosswise corner is cut back by; ten times what makes two points one
 
@@ -59,19 +59,9 @@ def raise_shell(
     if len(saddles):
         radius = max(SETBACK_M / GRID_M, 4 * reach) * widening
         raise Saddles([cure(sectors_at(v, xy, edges, side, levels), radius) for v in saddles])
-    # from here on numbers of a few dozen edges: plain lists are faster than arrays
-    label, xyz = side.ravel().tolist(), levels.vertices.tolist()
-    follow, face, level = levels.follow.tolist(), levels.face.tolist(), levels.level.tolist()
-    faces = roof_faces(follow, face, level, label, xyz, problem.part)
-    rises = wall_rises(follow, level)
-    runs = wall_runs(rises, follow, label, xyz) if merges_walls else [[h] for h in rises]
-    skip = {rises[h][0] for run in runs for h in run[1:]}
-    faces += [
-        Face((tuple([v for v in make_wall_ring(run, rises) if v not in skip]),), WALL)
-        for run in runs
-    ]
-    faces.append(ground_face(follow, level, label, skip, xyz))
-    return Solid(np.round(levels.vertices * GRID_M, 4), tuple(faces)).drop_unused_vertices()
+    roofs = draw_roofs(side.ravel(), levels, problem.part)
+    ground = draw_base(roofs, int(z_base))
+    return close_lids([*roofs, join_straight_edges(ground) if merges_walls else ground])
 
 
 def lowest_roof(xy: np.ndarray, edges: np.ndarray, side: np.ndarray, planes: np.ndarray) -> float:
@@ -81,135 +71,23 @@ def lowest_roof(xy: np.ndarray, edges: np.ndarray, side: np.ndarray, planes: np.
     return float(heights(planes[label, None], x, y)[label != OUTSIDE].min())
 
 
-def walks(follow: list[int], selection: list[bool]) -> list[list[int]]:
-    """Return closed walks of the selected half-edges, as lists of half-edges."""
-    visited = [False] * len(follow)
-    result = []
-    for first in range(len(follow)):
-        if visited[first] or not selection[first]:
-            continue
-        walk, h = [], first
-        while not visited[h]:
-            visited[h] = True
-            walk.append(h)
-            h = follow[h]
-        result.append(walk)
-    return result
-
-
-def signed_area(ring: list[int], xyz: list[list[float]]) -> float:
-    """Plan area of a ring of vertex indices, positive counter-clockwise."""
-    x0, y0, _ = xyz[ring[0]]
-    plan = [(xyz[vertex][0] - x0, xyz[vertex][1] - y0) for vertex in ring]
-    return 0.5 * sum(ax * by - ay * bx for (ax, ay), (bx, by) in pairwise(plan))
-
-
-def roof_faces(
-    follow: list[int],
-    face: list[int],
-    level: list[int],
-    label: list[int],
-    xyz: list[list[float]],
-    part: np.ndarray,
-) -> list[Face]:
-    """Return a RoofSurface a cell: its outer walk counter-clockwise from above, then holes."""
-    rings_of: dict[int, list[list[int]]] = {}
-    label_of = {}
-    for walk in walks(follow, [current != OUTSIDE for current in label]):
-        label_of[face[walk[0]]] = label[walk[0]]
-        rings_of.setdefault(face[walk[0]], []).append([level[h] for h in walk])
-    faces = []
-    for cell, rings in rings_of.items():
-        if len(rings) > 1:
-            rings.sort(key=lambda ring: -signed_area(ring, xyz))
-        faces.append(Face(tuple(map(tuple, rings)), ROOF, int(part[label_of[cell]])))
-    return faces
-
-
-def ground_face(
-    follow: list[int], level: list[int], label: list[int], skip: set[int], xyz: list[list[float]]
-) -> Face:
-    """Return the GroundSurface.
-
-    It has the walks around the outside, which run counter-clockwise seen from below. `skip` are
-    ground vertices in the middle of a straight wall, which nothing else needs.
-    """
-    rings = [
-        [level[h] for h in walk if level[h] not in skip]
-        for walk in walks(follow, [current == OUTSIDE for current in label])
+def draw_roofs(label: np.ndarray, levels: Levels, part: np.ndarray) -> list[Lid]:
+    """Draw a roof face a cell, its `label` (2e,) by half-edge, over the levels of its corners."""
+    face = levels.face.tolist()
+    corners = levels.vertices[levels.level].astype(np.int64).tolist()
+    z_of = {(cell, x, y): z for cell, (x, y, z) in zip(face, corners, strict=True)}
+    roofs = {cell: k for cell, k in zip(face, label.tolist(), strict=True) if k != OUTSIDE}
+    return [
+        Lid(
+            [
+                [(x, y, z_of[cell, x, y]) for x, y in ring]
+                for ring in list_rings(levels.polygons[cell - 1])
+            ],
+            ROOF,
+            int(part[k]),
+        )
+        for cell, k in roofs.items()
     ]
-    if len(rings) > 1:
-        rings.sort(key=lambda ring: signed_area(ring, xyz))
-    return Face(tuple(map(tuple, rings)), GROUND)
-
-
-def wall_rises(follow: list[int], level: list[int]) -> dict[int, tuple[int, int, int, int]]:
-    """Return half-edges whose left cell is higher, with low, high at the origin and the end."""
-    rises = {}
-    for h in range(len(follow)):
-        low_u = level[follow[h ^ 1]]
-        high_u = level[h]
-        low_v = level[h ^ 1]
-        high_v = level[follow[h]]
-        if high_u > low_u or high_v > low_v:
-            rises[h] = (low_u, high_u, low_v, high_v)
-    return rises
-
-
-def wall_runs(
-    rises: dict[int, tuple[int, int, int, int]],
-    follow: list[int],
-    label: list[int],
-    xyz: list[list[float]],
-) -> list[list[int]]:
-    """Group half-edges with walls into runs along straight stretches of the outline."""
-    outer = {follow[h ^ 1] ^ 1: h for h in rises if label[h ^ 1] == OUTSIDE}
-    next_edges = {
-        previous: h for previous, h in outer.items() if is_straight([previous, h], rises, xyz)
-    }
-    runs = [[h] for h in rises if label[h ^ 1] != OUTSIDE]
-    starts = set(outer.values()) - set(next_edges.values())
-    for first in sorted(starts):
-        run = [first]
-        while run[-1] in next_edges:
-            following = next_edges[run[-1]]
-            if is_straight([*run, following], rises, xyz):
-                run.append(following)
-            else:
-                runs.append(run)
-                run = [following]
-        runs.append(run)
-    return runs
-
-
-def is_straight(
-    run: list[int], rises: dict[int, tuple[int, int, int, int]], xyz: list[list[float]]
-) -> bool:
-    """Return whether all ground vertices inside a run lie on the line between its ends."""
-    ax, ay, _ = xyz[rises[run[0]][0]]
-    bx, by, _ = xyz[rises[run[-1]][2]]
-    length = max(math.hypot(bx - ax, by - ay), 1.0)
-    for h in run[1:]:
-        x, y, _ = xyz[rises[h][0]]
-        along = ((x - ax) * (bx - ax) + (y - ay) * (by - ay)) / length
-        across = abs((x - ax) * (by - ay) - (y - ay) * (bx - ax)) / length
-        if across > COLLINEAR_UNITS or not 0 < along < length:
-            return False
-    return True
-
-
-def make_wall_ring(run: list[int], rises: dict[int, tuple[int, int, int, int]]) -> list[int]:
-    """Return a wall's ring by every level, counter-clockwise from the right of its run."""
-    low_u, high_u, _, _ = rises[run[0]]
-    _, _, low_v, high_v = rises[run[-1]]
-    ring = [low_u, *range(low_v, high_v)]
-    for h, previous in zip(reversed(run), [*reversed(run[:-1]), None], strict=True):
-        ring.append(rises[h][3])
-        if previous is not None:
-            start, end = rises[h][1], rises[previous][3]
-            ring += range(start, end, 1 if end > start else -1)
-    ring += range(high_u, low_u, -1)
-    return list(dict.fromkeys(ring))
 
 
 @dataclass(frozen=True)

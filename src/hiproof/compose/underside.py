@@ -32,9 +32,11 @@ from .lids import (
     Lid,
     Place,
     close_lids,
+    draw_plan,
     list_edges,
     list_lids,
     list_places,
+    list_rings,
 )
 from .settle import PLAN_DIGITS
 
@@ -151,9 +153,7 @@ def list_undersides(
 
 def draw_ground(solid: Solid) -> shapely.Polygon:
     """Return the ground of a solid on one level in plan, on the grid."""
-    rings = [ring for lid in list_lids(solid, GROUND) for ring in lid.rings]
-    outer, *holes = ([corner[:2] for corner in ring] for ring in rings)
-    return shapely.Polygon(outer, holes)
+    return draw_plan(list_lids(solid, GROUND)[0])
 
 
 def place_knots(rings: list[list[Place]], underside: Underside) -> set[Place]:
@@ -231,15 +231,6 @@ def draw_lids(rings: list[list[Place]], ground: dict[Place, int]) -> Iterable[Li
     for triangle in shapely.orient_polygons(shapely.get_parts(triangles), exterior_cw=True):
         places = shapely.get_coordinates(triangle)[:3].astype(int).tolist()
         yield Lid([[(x, y, ground[x, y]) for x, y in places]], GROUND)
-
-
-def list_rings(polygon: shapely.Polygon) -> list[list[Place]]:
-    """Return the rings of a polygon on the grid, its area on their left."""
-    polygon = shapely.orient_polygons(polygon)
-    return [
-        [(x, y) for x, y in np.rint(shapely.get_coordinates(ring)[:-1]).astype(int).tolist()]
-        for ring in (polygon.exterior, *polygon.interiors)
-    ]
 
 
 def cut_cells(area: shapely.Polygon, passages: Iterable[Passage]) -> list[GroundCell]:

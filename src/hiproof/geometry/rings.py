@@ -105,11 +105,10 @@ def list_between(
     end: Sequence[float] | np.ndarray,
     places: np.ndarray,
     reach: float,
-    from_ends: float | None = None,
 ) -> np.ndarray:
     """Return which of `places` (n, d) lie on an edge, in its order.
 
-    They are within `reach` of it, and farther than that, or than `from_ends`, from its ends.
+    They are within `reach` of it, and farther than that from its ends.
 
     >>> places = np.array([[3.0, 0.0], [1.0, 0.0], [2.0, 1.0], [0.0, 0.0]])
     >>> list_between(np.zeros(2), np.array([4.0, 0.0]), places, 0.1).tolist()
@@ -117,12 +116,11 @@ def list_between(
     """
     along, offset = np.subtract(end, start), places - start
     length = float(np.linalg.norm(along))
-    gap = reach if from_ends is None else from_ends
-    if length <= 2.0 * gap:
+    if length <= 2.0 * reach:
         return np.empty(0, int)
     t = offset @ along / length
     aside = np.linalg.norm(offset - np.outer(t / length, along), axis=1)
-    is_on = (t > gap) & (t < length - gap) & (aside <= reach)
+    is_on = (t > reach) & (t < length - reach) & (aside <= reach)
     return np.flatnonzero(is_on)[np.argsort(t[is_on])]
 
 
