@@ -33,6 +33,7 @@ def compute_stamp(file: Path) -> str:
     return digest(closure(file))
 
 
+@functools.cache
 def compute_common_stamp() -> str:
     """Return one stamp of all sources of hiproof's compiled functions."""
     return digest(set().union(*map(closure, compiled_files())))

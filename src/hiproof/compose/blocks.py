@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
 import shapely
 
 from ..errors import CompositionError
 from ..frames import LocalFrame, turn_points
-from ..model import GROUND, ROOF, WALL, Face, Installation, Part, Piece, Roof, Solid
+from ..model import ROOF, Installation, Part, Piece, Roof, Solid
+from .arrangement import GRID_M
+from .lids import Lid, close_lids, draw_base, list_rings
 from .settle import PLAN_DIGITS
 from .solid import compose
 
@@ -25,20 +26,10 @@ def block(outline: shapely.Polygon, z_low: float, z_high: float) -> Solid:
     >>> check_solid(block(yard, 0.0, 5.0)), block(yard, 0.0, 5.0).volume
     ((), 420.0)
     """
-    outline = shapely.geometry.polygon.orient(outline)
-    rings = [shapely.get_coordinates(ring)[:-1] for ring in (outline.exterior, *outline.interiors)]
-    plan = np.concatenate(rings)
-    count, starts = len(plan), np.cumsum([0, *map(len, rings)])
-    numbers = [tuple(range(start, end)) for start, end in pairwise(starts.tolist())]
-    walls = [
-        Face(((a, b, b + count, a + count),), WALL)
-        for ring in numbers
-        for a, b in zip(ring, (*ring[1:], ring[0]), strict=True)
-    ]
-    top = Face(tuple(tuple(index + count for index in ring) for ring in numbers), ROOF, 0)
-    bottom = Face(tuple(ring[::-1] for ring in numbers), GROUND)
-    lower, upper = (np.column_stack([plan, np.full(count, z)]) for z in (z_low, z_high))
-    return Solid(np.concatenate([lower, upper]), (top, *walls, bottom))
+    low, high = (round(z / GRID_M) for z in (z_low, z_high))
+    plan = list_rings(shapely.transform(outline, lambda xy: xy / GRID_M))
+    roof = Lid([[(*place, high) for place in ring] for ring in plan], ROOF, 0)
+    return close_lids([roof, draw_base([roof], low)])
 
 
 def blocks(

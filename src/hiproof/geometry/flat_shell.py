@@ -79,7 +79,7 @@ class FlatShell:
         return member, self.ring_start[self.face_start[faces]][member] + place
 
     def draw_faces(self, faces: np.ndarray, flat: np.ndarray) -> np.ndarray:
-        """Return the polygons of ascending `faces` (k,), whose corners are at `flat` (n, 2)."""
+        """Return the polygons of ascending `faces` (k,), their corners at `flat` (n, 2 or 3)."""
         is_drawn = np.zeros(self.faces, bool)
         is_drawn[faces] = True
         corners = np.flatnonzero(is_drawn[self.face_of])

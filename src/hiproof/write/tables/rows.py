@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,7 +10,8 @@ import shapely
 
 from ...errors import OutputError
 from ...frames import METRES, Units
-from ...model import ROOF, Building, Face
+from ...geometry.flat_shell import FlatShell
+from ...model import ROOF, Building
 from ...model.roof_figures import RoofFigures
 from ..attribute_list import TABLES
 from ..building_attributes import ROW_ENCODER, part_values
@@ -104,10 +104,12 @@ def surface_rows(
     """
     if figures is None:
         return ()
-    vertices = np.round(units.from_metres(building.solid.vertices), 4)
-    roofs = [(index, face) for index, face in enumerate(building.solid.faces) if face.kind == ROOF]
-    polygons = shapely.to_wkb(make_polygons(vertices, [face for _, face in roofs]))
-    numbers = number_surfaces(building.solid.faces, building.parts)
+    solid = building.solid
+    roofs = [(index, face) for index, face in enumerate(solid.faces) if face.kind == ROOF]
+    shell = FlatShell(np.round(units.from_metres(solid.vertices), 4), *solid.flatten())
+    drawn = shell.draw_faces(np.array([index for index, _ in roofs], int), shell.corners)
+    polygons = shapely.to_wkb(drawn)
+    numbers = number_surfaces(solid.faces, building.parts)
     place = {index: k for k, (index, _) in enumerate(roofs)}
     rows: list[Row] = []
     for (index, face), polygon in zip(roofs, polygons, strict=True):
@@ -125,22 +127,6 @@ def surface_rows(
         }
         rows.append((polygon, values))
     return tuple(rows)
-
-
-def make_polygons(vertices: np.ndarray, faces: Sequence[Face]) -> np.ndarray:
-    """Return the polygons (k,) of faces over `vertices` (n, 3), made at once."""
-    rings = [ring for face in faces for ring in face.rings]
-    corners = vertices[[vertex for ring in rings for vertex in ring]]
-    lines = shapely.linearrings(
-        corners, indices=np.repeat(np.arange(len(rings)), [len(ring) for ring in rings])
-    )
-    without_holes = len(rings) == len(faces)  # then in a tenth of the time
-    face_of = (
-        None
-        if without_holes
-        else np.repeat(np.arange(len(faces)), [len(face.rings) for face in faces])
-    )
-    return shapely.polygons(lines, indices=face_of)
 
 
 def encode_geometry(geometry: shapely.Geometry | None, units: Units) -> bytes | None:
