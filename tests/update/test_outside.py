@@ -182,6 +182,28 @@ def test_an_extension_of_three_metres_is_found_wherever_it_lies(aside, tmp_path)
     assert summary.outside == {"extended": 1}
 
 
+@pytest.mark.parametrize("densities", [(8.0, 1.0), (1.0, 1.0), (1.0, 8.0)])
+def test_roofs_outside_are_found_in_sparse_surveys(densities, tmp_path):
+    """Of a survey of 1 point/m2 a third of the cells hold no points, which part no roof."""
+    before, after = (
+        make_town(houses=2, seed=seed, density=density)
+        for seed, density in zip((0, 7), densities, strict=True)
+    )
+    put_block(before, (40, 28, 46, 34))
+    for block in ((5, 28, 11, 34), (20, 12, 25, 18)):
+        put_block(after, block)
+    for name, town in (("first", before), ("second", after)):
+        write_cloud(tmp_path / f"{name}.laz", town.xyz, town.classification)
+    footprints = str(write_footprints(tmp_path / "footprints.geojson", before.footprints))
+    reconstruct_area(Request((str(tmp_path / "first.laz"),), tmp_path / "run", footprints))
+    second = (str(tmp_path / "second.laz"),)
+    summary = update_area(UpdateRequest(second, tmp_path / "out", run=tmp_path / "run", date=DATE))
+    assert summary.outside == {"built": 1, "demolished": 1, "extended": 1}
+    with (tmp_path / "out" / "changes.csv").open() as file:
+        areas = [float(r["area_m2"]) for r in csv.DictReader(file) if r["class"] == "outside"]
+    assert sorted(areas) == pytest.approx([30, 36, 36], rel=0.35)
+
+
 def test_build_makes_the_same_tables_of_the_parameters(update, tmp_path):
     _, out = update
     build_file(out / "parameters.jsonl", tmp_path)

@@ -208,7 +208,7 @@ def predict_occupancy(counts: np.ndarray) -> float:
     >>> [round(predict_occupancy(np.array(counts)), 3) for counts in ([0, 1, 2, 2], [9, 9])]
     [0.676, 1.0]
     """
-    mean = m = float(counts[counts > 0].mean())
+    mean = m = float(counts.sum() / max((counts > 0).sum(), 1))
     for _ in range(50):
         m = mean * -math.expm1(-m)
     return max(-math.expm1(-m), FEWEST_OCCUPIED)

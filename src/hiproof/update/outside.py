@@ -26,6 +26,7 @@ from ..settings import ReadSettings
 from ..status import ChangeKind
 from ..write.files import atomic_file, save_text
 from ..write.parameters import outline_record
+from .cells import predict_occupancy
 from .clusters import ROUGH_M, is_strip, link_neighbours, measure_roughness
 from .plan import EARLIER_FOLDER
 
@@ -37,6 +38,12 @@ some decimetres."""
 FEWEST_OUTSIDE, FEWEST_BEYOND = 8, 2
 """Cells of 1 m2 that a roof has, and that it has beyond that distance: a shed of 3 by 3 m has them,
 and what fills a gap of 5 m between neighbours."""
+
+SPARSE = 0.8
+"""Share of the cells of a roof that hold points, below which chance parts a roof into pieces, so
+cells belong together that lie up to two cells apart: 1.6 points/m2."""
+
+TWO_AROUND_KEYS = np.unique(AROUND_KEYS[:, None] + AROUND_KEYS)
 
 MOSTLY = 0.5
 """Share of the cells that show what stood there in the other survey."""
@@ -233,7 +240,8 @@ def find_fresh(
     around = find_keys(points)[:, None] + AROUND_KEYS
     near = touches(points, outlines, BESIDE_M) | np.isin(around, known).any(axis=1)
     on_ground = np.isin(find_keys(points), find_keys(other["ground"]))
-    found = describe_roofs(points, ~near, on_ground, MOSTLY, other["ground"], outlines, kind)
+    filled = predict_occupancy(roofs[:, 4])
+    found = describe_roofs(points, filled, ~near, on_ground, other["ground"], outlines, kind)
     extended = ChangeKind.EXTENDED.code
     return [
         (place, roof | {"id": names[beside[0]], "kind": extended} if len(beside) else roof)
@@ -256,37 +264,40 @@ def find_unmapped(
         points = points[here]
         is_steady = np.abs(points[:, 2] - other[there, 2]) < LEVEL_M
     every, ground = np.ones(len(points), bool), survey["ground"]
-    kind = ChangeKind.UNMAPPED
-    found = describe_roofs(points, every, is_steady, 0.0, ground, outlines, kind)
+    filled, kind = predict_occupancy(survey["roof"][:, 4]), ChangeKind.UNMAPPED
+    found = describe_roofs(points, filled, every, is_steady, ground, outlines, kind)
     return [(place, roof) for place, beside, roof in found if not len(beside)]
 
 
 def describe_roofs(
     points: np.ndarray,
+    filled: float,
     is_core: np.ndarray,
     is_sure: np.ndarray | None,
-    least: float,
     ground: np.ndarray,
     outlines: shapely.STRtree,
     kind: ChangeKind,
 ) -> Iterator[tuple[shapely.Geometry, np.ndarray, dict[str, Any]]]:
     """Yield each roof among cells (k, 5): its place, buildings beside it, its record.
 
-    The building that it adjoins most comes first. Its confidence is the share of its cells that are
-    sure (k,), `least` of them at least. That is None where they are unknown, as is its height
-    without `ground` (m, 5) near it.
+    A share `filled` of a roof's cells holds points. The building that it adjoins most comes first.
+    Its confidence is the share of its cells that are sure (k,), of a roof of one survey MOSTLY at
+    least. That is None where they are unknown, as is its height without `ground` (m, 5) near it.
     """
-    for members in group_cells(points, is_core):
+    known = predict_occupancy(ground[:, 4])
+    for members in group_cells(points, is_core, filled):
         share = None if is_sure is None else float(is_sure[members].mean())
-        if share is not None and share < least:
-            continue
+        if share is not None and kind is not ChangeKind.UNMAPPED:
+            share = min(1.0, share / known)  # some cells of bare ground hold no points
+            if share < MOSTLY:
+                continue
         low = find_cells(points[members])
         place = shapely.union_all(shapely.box(*low.T, *(low + 1).T))
         height = measure_height(points[members], ground)
         record = {
             "id": None,
             "kind": kind.code,
-            "area": float(len(members)),
+            "area": round(len(members) / filled, 1),
             "height": height if height is None else round(height, 2),
             "confidence": share if share is None else round(share, 2),
         }
@@ -308,19 +319,20 @@ def measure_height(points: np.ndarray, ground: np.ndarray) -> float | None:
     return float(np.median(points[:, 2]) - np.median(heights)) if len(heights) else None
 
 
-def group_cells(points: np.ndarray, is_core: np.ndarray) -> Iterator[np.ndarray]:
-    """Yield the members of each roof among cells `points` (k, 5).
+def group_cells(points: np.ndarray, is_core: np.ndarray, filled: float) -> Iterator[np.ndarray]:
+    """Yield the members of each roof among cells `points` (k, 5), of which a share is `filled`.
 
     It has FEWEST_BEYOND of the core (k,) side by side, and FEWEST_OUTSIDE with the cells beside
-    these, that form a surface.
+    these, that form a surface. In sparse surveys empty cells do not part it.
     """
     core, keys = np.flatnonzero(is_core), find_keys(points)
-    labels = label_components(len(core), link_neighbours(keys[core]))
+    beside = KEY_OF_CELL if filled > SPARSE else TWO_AROUND_KEYS
+    labels = label_components(len(core), link_neighbours(keys[core], beside))
     for label in np.flatnonzero(np.bincount(labels) >= FEWEST_BEYOND):
         members = core[labels == label]
         grown = np.isin(keys, keys[members, None] + AROUND_KEYS) & ~is_core
         place = np.union1d(members, np.flatnonzero(grown))
-        if len(place) < FEWEST_OUTSIDE or is_strip(points[place]):
+        if len(place) < FEWEST_OUTSIDE * filled or is_strip(points[place]):
             continue
         if measure_roughness(points[place, :3]) <= ROUGH_M:
             yield place
