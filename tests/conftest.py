@@ -1,6 +1,7 @@
 """Fixtures that several test files share."""
 
 import gc
+import multiprocessing
 import os
 import signal
 import warnings
@@ -12,7 +13,7 @@ import planted
 from hiproof import log, masking
 from hiproof.city import run as city_run
 from hiproof.city.run import Request, reconstruct_area
-from hiproof.city.work import solve
+from hiproof.city.work import processes, solve
 from hiproof.city.work.warm import make_ready
 from hiproof.compiled import news
 from hiproof.garbage import RARELY
@@ -60,6 +61,21 @@ def restore_log():
 def restore_secrets(monkeypatch):
     """Secrets that a test uses are hidden in its own messages alone."""
     monkeypatch.setattr(masking, "SECRETS", masking.Secrets())
+
+
+@pytest.fixture(autouse=True)
+def forked_workers(monkeypatch):
+    """Workers are forked from one process that has imported what they need, where that can be."""
+    if "forkserver" in multiprocessing.get_all_start_methods():
+        context = multiprocessing.get_context("forkserver")
+        context.set_forkserver_preload(planted.PRELOADED)
+        monkeypatch.setattr(processes, "get_context", lambda _: context)
+
+
+@pytest.fixture
+def spawned_workers(forked_workers, monkeypatch):
+    """Workers are started as those of users are, and import all that they need."""
+    monkeypatch.setattr(processes, "get_context", multiprocessing.get_context)
 
 
 @pytest.fixture

@@ -25,9 +25,7 @@ distributed = pytest.importorskip("distributed", reason="needs dask[distributed]
 def forked_workers():
     """Let Dask fork a dozen workers from one process that has imported what they need."""
     with dask.config.set({"distributed.worker.multiprocessing-method": "forkserver"}):
-        distributed.utils.get_mp_context().set_forkserver_preload(
-            ["hiproof.city.work.solve", "hiproof.fit.union", "distributed"]
-        )
+        distributed.utils.get_mp_context().set_forkserver_preload(planted.PRELOADED)
         yield
 
 

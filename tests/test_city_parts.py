@@ -148,7 +148,9 @@ def test_executors_return_every_task_with_result_or_error(executor):
     assert got == {i: ((None, ValueError) if i == 3 else (2 * i, type(None))) for i in range(6)}
 
 
-def test_workers_have_the_environment_and_the_folder_of_the_moment(tmp_path, monkeypatch):
+def test_workers_have_the_environment_and_the_folder_of_the_moment(
+    tmp_path, monkeypatch, spawned_workers
+):
     for name in ("first", "second"):
         folder = tmp_path / name
         folder.mkdir()

@@ -87,7 +87,7 @@ def test_a_file_that_cannot_be_written_gets_one_sentence(tmp_path):
         log.start(file=tmp_path)
 
 
-def test_workers_write_to_the_same_places(tmp_path, capfd):
+def test_workers_write_to_the_same_places(tmp_path, capfd, spawned_workers):
     log.start(file=tmp_path / "run.log")
     executor = Processes(1)
     list(

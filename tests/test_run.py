@@ -195,7 +195,9 @@ def test_progress_is_by_building(town_files, tmp_path, quick_tiles, processes):
     assert processes > 1 or set(counts) == {0, 1, 2, 3, 4}
 
 
-def test_two_workers_change_no_byte_and_compile_nothing(finished_run, files, tmp_path, monkeypatch):
+def test_two_workers_change_no_byte_and_compile_nothing(
+    finished_run, files, tmp_path, monkeypatch, spawned_workers
+):
     monkeypatch.setattr("hiproof.city.plan.prepare.MOST_BUILDINGS_A_TILE", 1)
     make_ready()
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_without_compiling)
