@@ -9,6 +9,7 @@ import pytest
 import shapely
 from benchmarks.building_changes import CHANGES, change_building
 
+from hiproof.frames import turn_points
 from hiproof.settings import ReadSettings
 from hiproof.simulate import random_building
 from hiproof.simulate.roofs import assemble, make_part
@@ -56,6 +57,23 @@ def test_of_120_unchanged_roofs_none_is_called_changed(rng, density):
         roof = random_building(rng).roof
         classes.append(judge((roof, scan(rng, roof, density)), scan(rng, roof, 8.0)).change)
     assert set(classes) == {Change.UNCHANGED}
+
+
+@pytest.mark.parametrize("densities", [(1.0, 1.0), (8.0, 1.0), (1.0, 8.0)])
+def test_a_dormer_in_sparse_points_is_hardly_ever_unchanged(densities):
+    """It fills hardly any cell of 2 m, so smaller ones are compared, too: of 3 m by 3 m."""
+    roof, classes = make_roof().roof, {"dormer": [], "none": []}
+    for seed in range(24):
+        rng = np.random.default_rng(seed)
+        old, new, other = (scan(rng, roof, d) for d in (*densities, densities[1]))
+        corner = rng.uniform((-6.0, 0.8), (3.0, 1.2))
+        local = turn_points(new[:, :2], -0.3) - corner
+        inside = ((local > 0) & (local < 3.0)).all(axis=1)
+        new[inside, 2] = 6.0 + GABLE["height"] + rng.normal(0, 0.03, inside.sum())
+        for name, points in (("dormer", new), ("none", other)):
+            classes[name].append(judge((roof, old), points).change)
+    assert classes["none"].count(Change.UNCHANGED) == 24
+    assert classes["dormer"].count(Change.UNCHANGED) <= 6, classes["dormer"]
 
 
 def list_changes(kind, count=6):

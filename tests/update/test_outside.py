@@ -217,6 +217,18 @@ def test_build_makes_the_same_tables_of_the_parameters(update, tmp_path):
     ]
 
 
+def test_a_change_without_a_place_has_its_class_as_kind(update, tmp_path):
+    """Such as a shed that the survey does not cover: too small for a place of its own."""
+    lines = (update[1] / "parameters.jsonl").read_text().splitlines()
+    change = {"class": "not_covered", "survey": DATE, "chance": 1.0, "places": [], "lineage": []}
+    change |= {"predecessors": [], "valid_from": None, "valid_to": None}
+    lines[1] = json.dumps(json.loads(lines[1]) | {"change": change})
+    (tmp_path / "parameters.jsonl").write_text("\n".join(lines) + "\n")
+    write_changes(tmp_path)
+    with (tmp_path / "changes.csv").open() as file:
+        assert next(csv.DictReader(file))["kind"] == "not_covered"
+
+
 @pytest.mark.parametrize(
     ("value", "words"),
     [

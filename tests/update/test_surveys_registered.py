@@ -255,7 +255,7 @@ def test_a_shift_that_roofs_and_ground_contradict_is_told(text, told, has_ground
     assert len(sentences) == told, caught
 
 
-@pytest.mark.parametrize("text", ["", "on", "1,2", "1,2,nan", "1;2;3"])
+@pytest.mark.parametrize("text", ["", "on", "1,2", "1,2,nan", "1;2;3", "0,0,1e300", "-1001,0,0"])
 def test_a_shift_that_is_none_is_refused(text):
     with pytest.raises(SettingsError, match="three numbers such as"):
         read_shift(text)

@@ -129,18 +129,21 @@ def shrink_outline(outline: shapely.Polygon) -> shapely.Geometry:
 
 
 def compare_points(
-    roof: Roof, old: np.ndarray | None, new: np.ndarray, noise: SurveyNoise
+    roof: Roof,
+    old: np.ndarray | None,
+    new: np.ndarray,
+    noise: SurveyNoise,
+    cell_m: float | None = None,
 ) -> CellComparison:
     """Compare the `old` and `new` points (n, 3) of a building.
 
-    Both are in its roof's frame.
-
-    Without old points the earlier roof itself stands for them.
+    Both are in its roof's frame. Without old points the earlier roof itself stands for them. The
+    side of the cells follows from the points where `cell_m` does not give it.
     """
     inner, outline_m2 = shrink_outline(roof.outline), roof.outline.area
     surveys = [select_inner(roof, inner, xyz) for xyz in (old, new) if xyz is not None]
     new, r_new = surveys[-1]
-    cell_m = choose_cell(inner, *(xyz for xyz, _ in surveys))
+    cell_m = cell_m or choose_cell(inner, *(xyz for xyz, _ in surveys))
     cells, number = number_cells(
         np.floor(np.concatenate([xyz[:, :2] for xyz, _ in surveys]) / cell_m)
     )

@@ -154,7 +154,7 @@ def make_row(
     found = change.record["change"]
     place = next(iter(found["places"]), {}) if place is None else place
     old_part, new_part = place.get("parts") or (None, None)
-    values = place | {
+    values = {"kind": found["class"], **place} | {
         "id": change.record["id"],
         "class": found["class"],
         "chance": found["chance"],

@@ -17,7 +17,7 @@ import numpy as np
 from ..geometry.grid import AROUND_KEYS, KEY_OF_CELL
 from ..model import Roof
 from ..status import Change
-from .cells import CellComparison, compare_points, predict_occupancy, summarise_cells
+from .cells import CELL_SIDES_M, CellComparison, compare_points, predict_occupancy, summarise_cells
 from .clusters import (
     FARTHEST_SIGMAS,
     KEPT_SHARE,
@@ -67,6 +67,10 @@ none."""
 
 DOUBTFUL_M2 = 4.0
 """Area (m2) from which on points that lie on no surface make a building uncertain."""
+
+SMALL_CELL_M = CELL_SIDES_M[1]
+"""Side (m) of cells in which sparse surveys are compared once more. Dormers fill hardly any of the
+usual ones, and too few points lie in these to be sure."""
 
 
 @dataclass(frozen=True)
@@ -131,6 +135,13 @@ def judge_building(
         and c.area_m2 > max(beyond, SMALLEST_BARE_M2)
         and not passes_pulses(comparison, was_roof, on_ground, c.members)
     )
+    if not doubtful and comparison.cell_m > SMALL_CELL_M:
+        comparison = compare_points(roof, old, new, shift.noise, SMALL_CELL_M)
+        doubtful = tuple(
+            c
+            for c in find_clusters(comparison, shift.noise.stray)
+            if c.chance < significance and c.area_m2 >= DOUBTFUL_M2 and c.area_m2 > beyond
+        )
     if doubtful:
         return ChangeVerdict(Change.UNCERTAIN, comparison, ground, doubtful[0].chance, doubtful)
     return ChangeVerdict(Change.UNCHANGED, comparison, ground)

@@ -43,6 +43,9 @@ MOST_POINTS = 400
 SHIFT_SCALE_M = 0.25
 """Residuals beyond are outliers (m)."""
 
+LONGEST_SHIFT_M = 1000.0
+"""Longest shift (m) that may be given: reference systems lie up to hundreds of metres apart."""
+
 STARTS_M, SHIFT_ROUNDS = (-0.5, 0.0, 0.5), 8
 """Shifts (m) to the east and to the north from which an estimate starts, and its steps. Where most
 roofs rose, some of these fit a shift, too, so the best of nine estimates counts.
@@ -252,10 +255,10 @@ def read_shift(text: str) -> tuple[float, float, float] | None:
         x, y, z = map(float, text.split(","))
     except ValueError:
         x = y = z = math.nan
-    if not all(map(math.isfinite, (x, y, z))):
+    if not all(abs(value) <= LONGEST_SHIFT_M for value in (x, y, z)):
         raise SettingsError(
             f"expected --shift auto, off or three numbers such as 0.1,-0.2,0.05, got {text!r:.40}; "
-            "they are metres to the east, to the north and up"
+            f"they are metres to the east, to the north and up, up to {LONGEST_SHIFT_M:g}"
         )
     return x, y, z
 
