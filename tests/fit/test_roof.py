@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import shapely
 
+from hiproof.compiled import compiled
 from hiproof.compose import compose
 from hiproof.fit.roof import add, fit_building, read_parts
 from hiproof.fit.roof.accept import LOOP_ROUNDS, fit_roof, improve, try_move
@@ -84,8 +85,13 @@ def price(roof, site):
 
 
 def try_exactly(roof, trial, move, site):
-    changed, room = np.zeros(len(roof.sides), bool), np.empty((len(roof.sides), 4))
-    drawing = make_drawing(len(roof.sides))
+    return try_in_drawing(roof, trial, move, site, make_drawing(len(roof.sides)))
+
+
+@compiled
+def try_in_drawing(roof, trial, move, site, drawing):
+    """Call it as the loop does: called from Python it would be compiled once more."""
+    changed, room = np.zeros(len(roof.sides), np.bool_), np.empty((len(roof.sides), 4))
     known = know(roof, drawing, site)
     return try_move(roof, trial, move, site, drawing, known, changed, room, True)[0]
 
