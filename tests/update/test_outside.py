@@ -165,6 +165,27 @@ def test_an_extension_that_fills_a_gap_between_others_is_found(gap, turn, tmp_pa
     assert row["id"] == "house-0"
 
 
+def test_a_shift_is_taken_off_roofs_outside(tmp_path):
+    """Else an extension stands apart from its house, and all roofs reach beyond their outlines."""
+    before, after = make_town(density=8.0), make_town(seed=7, density=8.0)
+    put_block(after, (20, 12, 24, 20))
+    for name, town, shift in (("first", before, 0.0), ("second", after, [0.8, 0.3, 0.5])):
+        write_cloud(tmp_path / f"{name}.laz", town.xyz + shift, town.classification)
+    footprints = str(write_footprints(tmp_path / "footprints.geojson", before.footprints))
+    reconstruct_area(Request((str(tmp_path / "first.laz"),), tmp_path / "run", footprints))
+    second = (str(tmp_path / "second.laz"),)
+    summary = update_area(
+        UpdateRequest(second, tmp_path / "out", run=tmp_path / "run", date=DATE),
+        {"read": {"shift": "0.8,0.3,0.5"}},
+    )
+    assert summary.outside == {"extended": 1}
+    roof = json.loads((tmp_path / "out" / "parameters.jsonl").read_text().splitlines()[0])
+    (ring,) = roof["update"]["roofs_outside"][0]["outlines"][0]
+    box = shapely.transform(shapely.box(20, 12, 24, 20), lambda xy: xy + ORIGIN[:2])
+    common = shapely.intersection(shapely.Polygon(ring), box).area
+    assert common > 0.75 * max(box.area, shapely.Polygon(ring).area)
+
+
 @pytest.mark.parametrize("aside", [0.3, 0.5, 0.8])
 def test_an_extension_of_three_metres_is_found_wherever_it_lies(aside, tmp_path):
     """Its cells beside the outline count where those beyond them are few."""

@@ -94,12 +94,12 @@ def prepare_surveys(
         (state / EARLIER_FOLDER / SORTED_MARK).touch()
     if (state / SURVEYS_FILE).exists():
         return
-    save_roofs_outside(state, plan, bool(earlier.clouds))
     samples = draw_samples(state, plan, request.terrain)
     shift = register_surveys(samples, request.settings.read)
     shift.refuse_other_heights(f"survey of {date}")
     shift.warn(f"survey of {date}")
     LOGGER.info("the new survey lies beside the earlier one by %s", shift.to_dict())
+    save_roofs_outside(state, plan, bool(earlier.clouds), shift.clear_xyz)
     texts = find_texts(request.run, plan)
     surveys = Surveys(
         shift,

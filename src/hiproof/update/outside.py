@@ -142,8 +142,13 @@ def join_cells(chunks: list[np.ndarray]) -> np.ndarray:
     return average_cells(np.concatenate(chunks)) if chunks else np.zeros((0, 5))
 
 
-def load_survey(folder: Path, low: np.ndarray, high: np.ndarray) -> dict[str, np.ndarray]:
-    """Load the roof and ground cells (k, 5) of a survey between two corners (2,)."""
+def load_survey(
+    folder: Path, low: np.ndarray, high: np.ndarray, shift: np.ndarray | None = None
+) -> dict[str, np.ndarray]:
+    """Load the roof and ground cells (k, 5) of a survey between two corners (2,).
+
+    A `shift` (3,) is taken off them.
+    """
     chunks: dict[str, list[np.ndarray]] = {"roof": [], "ground": []}
     has_classes = True
     for path in list_files(folder):
@@ -155,11 +160,19 @@ def load_survey(folder: Path, low: np.ndarray, high: np.ndarray) -> dict[str, np
                 cells = arrays[kind]
                 inside = ((cells[:, :2] >= low) & (cells[:, :2] <= high)).all(axis=1)
                 if inside.any():
-                    found.append(cells[inside])
+                    found.append(move_cells(cells[inside], shift))
     result = {kind: join_cells(found) for kind, found in chunks.items()}
     if not has_classes:
         result["roof"] = result["roof"][is_level_and_high(**result)]
     return result
+
+
+def move_cells(rows: np.ndarray, shift: np.ndarray | None) -> np.ndarray:
+    """Return the cells of rows (k, 5) once a shift (3,) is taken off."""
+    if shift is None or not shift.any():
+        return rows
+    squares = rows[:, 3] - 2 * shift[2] * rows[:, 2] + shift[2] ** 2
+    return average_cells(np.column_stack([rows[:, :3] - shift, squares, rows[:, 4]]))
 
 
 def list_files(folder: Path) -> list[Path]:
@@ -177,10 +190,11 @@ def is_level_and_high(roof: np.ndarray, ground: np.ndarray) -> np.ndarray:
     return (scatter < LEVEL_M) & (roof[:, 2] - ground[nearest, 2] > HIGH_OVER_GROUND_M)
 
 
-def save_roofs_outside(state: Path, plan: WorkPlan, has_earlier: bool) -> None:
+def save_roofs_outside(state: Path, plan: WorkPlan, has_earlier: bool, shift: np.ndarray) -> None:
     """Find the roofs outside all outlines, and keep them in the folder `state`.
 
-    A roof belongs to the square in which the lower left corner of its place lies.
+    The `shift` (3,) of the new survey is taken off. A roof belongs to the square in which the lower
+    left corner of its place lies.
     """
     folders = state / CELLS_FOLDER, state / EARLIER_FOLDER / CELLS_FOLDER
     jobs = [job for job in plan.jobs if not job.area.is_empty]
@@ -199,7 +213,8 @@ def save_roofs_outside(state: Path, plan: WorkPlan, has_earlier: bool) -> None:
     for square in np.unique(np.concatenate([np.empty((0, 2)), *squares]), axis=0):
         low = square * BLOCK_M - BLOCK_REACH_M
         high = (square + 1) * BLOCK_M + BLOCK_REACH_M
-        new, old = (load_survey(folder, low, high) for folder in folders)
+        new = load_survey(folders[0], low, high, shift)
+        old = load_survey(folders[1], low, high)
         roofs = find_unmapped(new, old["roof"] if has_earlier else None, outlines)
         if has_earlier:
             roofs += find_fresh(new["roof"], old, outlines, names, ChangeKind.BUILT)
