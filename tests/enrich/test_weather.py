@@ -142,16 +142,28 @@ def test_an_epw_of_a_leap_year_is_that_of_its_other_days(tmp_path):
 
 def test_a_year_without_direct_radiation_comes_with_a_warning(tmp_path):
     write_epw(tmp_path / "a.epw", change=make_overcast)
-    with pytest.warns(InputWarning, match="a.epw: has hardly any direct radiation in a year"):
+    with pytest.warns(InputWarning, match="a.epw: has hardly any direct radiation in . months"):
         make_sky(*DELFT, 0.0, 0.0, str(tmp_path / "a.epw"))
 
 
-@pytest.mark.parametrize("factor", [2.0, 3.6])
-def test_a_year_without_clear_hours_comes_with_a_warning(factor, tmp_path):
+def test_a_summer_without_direct_radiation_comes_with_a_warning(tmp_path):
+    """As where an instrument failed, and its rest was filled by diffuse radiation."""
+
+    def change(columns):
+        rows = slice(181 * 24, 243 * 24)
+        columns["dhi"][rows], columns["dni"][rows] = columns["ghi"][rows], 0.0
+
+    write_epw(tmp_path / "a.epw", change=change)
+    with pytest.warns(InputWarning, match="a.epw: has hardly any direct radiation in 2 months"):
+        make_sky(*DELFT, 0.0, 0.0, str(tmp_path / "a.epw"))
+
+
+@pytest.mark.parametrize("factor, share", [(2.0, "[23]"), (3.6, "[23]"), (0.77, "9")])
+def test_a_year_without_clear_hours_comes_with_a_warning(factor, share, tmp_path):
     """Such as kJ in place of Wh: every climate has hours in which most of the sun comes down."""
-    lower = dict.fromkeys(("ghi", "dhi", "dni"), lambda v: v / factor)
-    write_epw(tmp_path / "a.epw", change=spoil(**lower))
-    with pytest.warns(InputWarning, match="no clear hours; the brightest have [23][0-9]%"):
+    other = dict.fromkeys(("ghi", "dhi", "dni"), lambda v: v / factor)
+    write_epw(tmp_path / "a.epw", change=spoil(**other))
+    with pytest.warns(InputWarning, match=f"has {share}[0-9]% .* in its brightest hours"):
         make_sky(*DELFT, 0.0, 0.0, str(tmp_path / "a.epw"))
 
 

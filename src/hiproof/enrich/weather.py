@@ -47,9 +47,10 @@ share of the year: 0.003 in pvlib's TMY3 files, 0.06 where hours are half of one
 """
 GREATEST_GAP_WM2 = 300.0  # of either in one hour (W/m2); up to 250 where hours are one off
 LEAST_CLEARNESS = 0.1  # of the radiation above the atmosphere: 0.3 in the dullest climates on Earth
-LEAST_DIRECT = 0.05  # of a year's global radiation: a third in dull climates, 0 in no climate
-BRIGHTEST, LEAST_BRIGHTNESS = 0.99, 0.5
-"""Quantile of the hours with a high sun, and the share of the radiation above the atmosphere that
+LEAST_DIRECT = 0.02  # of a month's global radiation, where it is high: 0 in no climate
+BRIGHT_MONTH = 0.06  # of a year's global radiation: a month of summer, or any near the equator
+BRIGHTEST, USUAL_BRIGHTNESS = 0.99, (0.5, 0.9)
+"""Quantile of the hours with a high sun, and the shares of the radiation above the atmosphere that
 it has to reach: clear skies let 0.7 to 0.8 pass, and every climate has clear hours.
 """
 LEAST_STUCK_WM2 = 50.0  # W/m2; in whole ones, winter days of the north have less in equal hours
@@ -250,7 +251,7 @@ def refuse_other_sun(weather: Weather, path: str) -> None:
             "another file"
         )
     brightness = float(np.quantile((ghi / ceiling)[is_high] / rise[is_high], BRIGHTEST))
-    warn_of_dull_sun(path, float(dhi.sum()) / total, brightness)
+    warn_of_unusual_sun(path, brightness, weather)
     warn_of_moved_sun(weather, rises, path)
     warn_of_repeated_hours(weather, path)
 
@@ -262,20 +263,24 @@ def find_gaps(is_lit: np.ndarray) -> np.ndarray:
     return ~is_lit & (is_between | ~is_lit.any(axis=1, keepdims=True))
 
 
-def warn_of_dull_sun(path: str, diffuse_share: float, brightness: float) -> None:
-    """Warn of a year without direct radiation, or without clear hours."""
-    if diffuse_share > 1 - LEAST_DIRECT:
+def warn_of_unusual_sun(path: str, brightness: float, weather: Weather) -> None:
+    """Warn of bright months without direct radiation, and of hours too dull or too bright."""
+    ghi, dhi, _ = weather.values.groupby(weather.times.month).sum().to_numpy().T
+    is_dull = (dhi > (1 - LEAST_DIRECT) * ghi) & (ghi > BRIGHT_MONTH * ghi.sum())
+    low, high = USUAL_BRIGHTNESS
+    if is_dull.any():
         warn(
             path,
-            "has hardly any direct radiation in a year, which no climate has, so slopes that face "
-            "the sun get too little; use a file with direct radiation",
+            f"has hardly any direct radiation in {count_things(int(is_dull.sum()), 'month')} with "
+            "much sun, which no climate has, so slopes that face the sun get too little; use a "
+            "file with direct radiation",
         )
-    elif brightness < LEAST_BRIGHTNESS:
+    elif not low <= brightness <= high:
         warn(
             path,
-            f"has no clear hours; the brightest have {brightness:.0%} of what reaches the "
-            "atmosphere, and 70 % are usual, so all sun may be too low; check that the unit is "
-            "W/m2",
+            f"has {brightness:.0%} of what reaches the atmosphere in its brightest hours, and 70 % "
+            f"are usual, so all sun may be too {'low' if brightness < low else 'high'}; check that "
+            "the unit is W/m2",
         )
 
 
