@@ -84,6 +84,18 @@ class PartsRoof:
         units = np.array([count_units([part], self.outline) for part in self.parts])
         return np.maximum(seen, 1), units
 
+    def select_around(self, shape: Part) -> PartsRoof:
+        """Return the roof of the parts that a shape may change and of those beside them."""
+        parts = select_touching(self.parts, unite_outlines([shape]))
+        parts = select_touching(self.parts, unite_outlines(parts))
+        if len(parts) in (0, len(self.parts)):
+            return self
+        x0, y0, x1, y1 = shapely.total_bounds([rim for part in parts for rim in part.outlines])
+        points = self.points[np.searchsorted(self.points[:, 0], x0) :]
+        points = points[: np.searchsorted(points[:, 0], x1, "right")]
+        is_near = (points[:, 1] >= y0) & (points[:, 1] <= y1)
+        return replace(self, parts=parts, points=points[is_near], known={})
+
     def find_near(self, centre: np.ndarray, radius: float) -> np.ndarray:
         """Return the numbers (k,) of the points in a disc."""
         first, last = np.searchsorted(self.points[:, 0], (centre[0] - radius, centre[0] + radius))
@@ -146,19 +158,23 @@ def is_disc(part: Part) -> bool:
     )
 
 
-def accept(roof: PartsRoof, shapes: Iterable[tuple[Part, int]]) -> PartsRoof:
-    """Return the cheapest roof with one of the shapes, or as it is.
+def accept(
+    roof: PartsRoof, shapes: Iterable[tuple[Part, int]], saved: float = 0.0
+) -> tuple[PartsRoof, float]:
+    """Return the cheapest roof with one of the shapes, and what it saves (points).
 
-    Each shape comes with how many of its numbers nothing but points gives, beside its heights.
+    Each shape comes with how many of its numbers nothing but points gives, beside its heights. One
+    that does not save more than `saved` leaves the roof as it is.
     """
-    best, least = roof, roof.price
+    best = roof.parts
     for shape, count in shapes:
-        for parts in list_roofs(roof, shape):
-            new = replace(roof, parts=parts, known=roof.covered)
-            price = new.price + UNKNOWN_UNITS * roof.unit * count
-            if price < least:
-                best, least = new, price
-    return best
+        near = roof.select_around(shape)
+        for parts in list_roofs(near, shape):
+            new = replace(near, parts=parts, known=near.covered)
+            gain = near.price - new.price - UNKNOWN_UNITS * roof.unit * count
+            if gain > saved:
+                best, saved = [*exclude_parts(roof.parts, near.parts), *parts], gain
+    return (roof if best is roof.parts else replace(roof, parts=best, known=roof.covered)), saved
 
 
 def accept_all(
@@ -170,14 +186,10 @@ def accept_all(
     """
     asked = roof.parts
     while asked:
-        saving = []
-        for shape in list_shapes(roof, asked):
-            better = accept(roof, [shape])
-            if better is not roof:
-                saving.append((better.price, shape))
+        saving = [(accept(roof, [shape])[1], shape) for shape in list_shapes(roof, asked)]
         before = roof.parts
-        for _, shape in sorted(saving, key=lambda pair: pair[0]):
-            roof = accept(roof, [shape])
+        for saved, shape in sorted(saving, key=lambda pair: -pair[0]):
+            roof = accept(roof, [shape])[0] if saved > 0.0 else roof
         new = exclude_parts(roof.parts, before)
         asked = select_touching(roof.parts, unite_outlines(new)) if new else []
     return roof

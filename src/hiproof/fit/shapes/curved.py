@@ -37,7 +37,7 @@ def fit_shapes(
     roof = make_parts_roof(parts, points, outline, settings)
     for arc in find_arcs(outline):
         drums = list_arc_drums(roof, arc) if "flat" in names else ()
-        roof = accept(roof, chain(drums, list_arc_shapes(roof, arc, names)))
+        roof, _ = accept(roof, chain(drums, list_arc_shapes(roof, arc, names)))
 
     def list_shapes(one: PartsRoof, asked: list[Part]) -> Iterator[tuple[Part, int]]:
         yield from list_composite_shapes(one, asked, composite, settings)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
+import numpy as np
 import shapely
 
 from ...geometry.rings import intersect, unite
@@ -29,7 +30,10 @@ def unite_outlines(parts: Iterable[Part]) -> shapely.Geometry:
 
 def select_touching(parts: Iterable[Part], area: shapely.Geometry) -> list[Part]:
     """Select the parts that touch an area."""
-    return [part for part in parts if shapely.dwithin(area, part.outlines, OVERLAY_GAP_M).any()]
+    parts = list(parts)
+    owners = np.repeat(np.arange(len(parts)), [len(part.outlines) for part in parts])
+    outlines = [outline for part in parts for outline in part.outlines]
+    return [parts[k] for k in np.unique(owners[shapely.dwithin(area, outlines, OVERLAY_GAP_M)])]
 
 
 def exclude_parts(parts: Iterable[Part], excluded: Iterable[Part]) -> list[Part]:
