@@ -23,6 +23,7 @@ from .moves import (
     list_moves,
 )
 from .price import (
+    Known,
     count_known_units,
     fit_unknowns,
     know,
@@ -166,41 +167,46 @@ def note_touched(roof, trial, changed, is_share, touched):
 
 
 @compiled
+def make_moves(roof, trial, site, drawing, known, questions, touched):
+    """Make the moves that save of those that `questions` (v,) ask for, the best first.
+
+    Notes in `touched` (v,) which to try next. Returns what is then known of the roof.
+    """
+    changed, room = np.zeros(len(roof.sides), np.bool_), np.empty((len(roof.sides), 4))
+    moves, gains = np.empty((MOST_MOVES, MOVE_COLUMNS), np.int64), np.empty(MOST_MOVES)
+    count, least = list_moves(roof, site, questions, moves), LEAST_UNITS * site.unit
+    for m in range(count):
+        gains[m], _ = try_move(roof, trial, moves[m], site, drawing, known, changed, room, False)
+    touched[:] = NO_MOVES
+    for m in np.argsort(-gains[:count], kind="mergesort"):
+        if gains[m] <= least:
+            break
+        move = moves[m]
+        gain, boxes = try_move(roof, trial, move, site, drawing, known, changed, room, True)
+        if gain <= least:
+            continue
+        note_touched(roof, trial, changed, move[0] == SHARE, touched)
+        copy_tables(trial, roof)
+        known = know_change(roof, drawing, site, boxes, BESIDE_M, known)
+    return known
+
+
+@compiled
 def improve(roof, trial, site, drawing, asked, rounds):
     """Improve a roof by moves that concern volumes `asked` (v,), until none saves.
 
     Returns its price (points).
     """
-    size = len(roof.sides)
-    changed, room = np.zeros(size, np.bool_), np.empty((size, 4))
-    questions, touched = np.where(asked, ALL_MOVES, NO_MOVES), np.zeros(size, np.int64)
-    moves, gains = np.empty((MOST_MOVES, MOVE_COLUMNS), np.int64), np.empty(MOST_MOVES)
-    lowest, least = np.inf, LEAST_UNITS * site.unit
+    questions, touched = np.where(asked, ALL_MOVES, NO_MOVES), np.zeros(len(asked), np.int64)
+    lowest = np.inf
     for _ in range(rounds):
         fit_roof(roof, site, FIT_ROUNDS)
         known = know(roof, drawing, site)
         price = price_known(known, site)
-        if price > lowest - least:
+        if price > lowest - LEAST_UNITS * site.unit:
             return price
         lowest = price
-        count = list_moves(roof, site, questions, moves)
-        for m in range(count):
-            gains[m], _ = try_move(
-                roof, trial, moves[m], site, drawing, known, changed, room, False
-            )
-        order = np.argsort(-gains[:count], kind="mergesort")
-        touched[:] = NO_MOVES
-        for q in range(count):
-            m = order[q]
-            if gains[m] <= least:
-                break
-            move = moves[m]
-            gain, boxes = try_move(roof, trial, move, site, drawing, known, changed, room, True)
-            if gain <= least:
-                continue
-            note_touched(roof, trial, changed, move[0] == SHARE, touched)
-            copy_tables(trial, roof)
-            known = know_change(roof, drawing, site, boxes, BESIDE_M, known)
+        make_moves(roof, trial, site, drawing, known, questions, touched)
         if not touched.any():
             return price
         place = 0
@@ -211,3 +217,23 @@ def improve(roof, trial, site, drawing, asked, rounds):
         questions[place:] = NO_MOVES
         pack(roof)
     return price_roof(roof, drawing, site)
+
+
+@compiled
+def improve_new(roof, new, trial, site, drawing, known, k):
+    """Fit volume k, which is `new` to a roof that is `known`, and make its moves once.
+
+    Returns what is then known.
+    """
+    changed, room = np.zeros(len(roof.sides), np.bool_), np.empty((len(roof.sides), 4))
+    changed[k] = True
+    boxes = room[: list_changes(roof, new, changed, site, room)]
+    places, count = list_unknowns(new, site, boxes)
+    view, points = list_view(new, boxes), list_points(site, boxes)
+    fit_unknowns(new, site, view, points, places, count, FIT_ROUNDS)
+    start = Known(known.costs.copy(), known.corners, known.steps, known.units)
+    start = know_change(new, drawing, site, boxes, BESIDE_M, start)
+    questions = np.where(changed, ALL_MOVES, NO_MOVES)
+    better = make_moves(new, trial, site, drawing, start, questions, np.zeros_like(questions))
+    pack(new)
+    return better

@@ -25,10 +25,10 @@ from ..union.scene import Scene
 from ..union.volumes import DIRECTION, REPLACES, U0
 from ..union.whole import Box, Whole
 from ..union.window import open_window
-from .accept import LEAST_UNITS, improve
+from .accept import LEAST_UNITS, improve_new
 from .copies import add_copy, list_copies
 from .draw import Drawing, compute_heights
-from .price import OVER_M, Site
+from .price import OVER_M, Known, Site, know, price_known
 from .start import add_volume, put_on_walls
 from .tables import VOLUME_COUNT, Tables, copy_tables, make_tables_like
 
@@ -49,14 +49,12 @@ def add_volumes(
 
     Returns which volumes (v,) of the roof then lie where any was added.
     """
-    nobody, windows = np.zeros(len(roof.sides), np.bool_), []
-    price = improve(roof, trial, site, drawing, nobody, 1)
+    known, windows = know(roof, drawing, site), []
     for box in list_places(roof, site):
-        scene, start, last = open_window(whole, box, EFFORT.pool_points), price, np.inf
-        while scene is not None and price < last:
-            last = price
-            price = add_best(roof, trial, site, drawing, scene, box, price)
-        if price < start:
+        scene, start, last = open_window(whole, box, EFFORT.pool_points), known, None
+        while scene is not None and known is not last:
+            last, known = known, add_best(roof, trial, site, drawing, scene, box, known)
+        if known is not start:
             windows.append(box)
     (x0, x1, y0, y1), near = roof.boxes.T, np.zeros(len(roof.sides), np.bool_)
     for u0, u1, v0, v1 in windows:
@@ -84,21 +82,19 @@ def list_places(roof: Tables, site: Site) -> Iterator[Box]:
 
 
 def add_best(
-    roof: Tables, trial: Tables, site: Site, drawing: Drawing, scene: Scene, box: Box, price: float
-) -> float:
-    """Add the volume that saves most in a window to a roof with a `price`. Returns the new one."""
+    roof: Tables, trial: Tables, site: Site, drawing: Drawing, scene: Scene, box: Box, known: Known
+) -> Known:
+    """Add the volume that saves most in a window to a roof. Returns what is then known of it."""
     if (roof.counts + ROWS > [len(roof.sides), len(roof.lines), len(roof.values)]).any():
-        return price
-    best, lowest = roof, price - LEAST_UNITS * site.unit
+        return known
+    best, best_known, lowest = roof, known, price_known(known, site) - LEAST_UNITS * site.unit
     for new, k in list_additions(roof, site, scene, box):
-        asked = np.arange(len(roof.sides)) == k
-        cost = improve(new, trial, site, drawing, asked, 1)
-        if cost < lowest:
-            best, lowest = new, cost
-    if best is roof:
-        return price
-    copy_tables(best, roof)
-    return lowest
+        after = improve_new(roof, new, trial, site, drawing, known, k)
+        if price_known(after, site) < lowest:
+            best, best_known, lowest = new, after, price_known(after, site)
+    if best is not roof:
+        copy_tables(best, roof)
+    return best_known
 
 
 def list_additions(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -28,12 +28,11 @@ def unite_outlines(parts: Iterable[Part]) -> shapely.Geometry:
     return unite([piece.outline for part in parts for piece in part.pieces])
 
 
-def select_touching(parts: Iterable[Part], area: shapely.Geometry) -> list[Part]:
+def select_touching(parts: Sequence[Part], area: shapely.Geometry) -> list[Part]:
     """Select the parts that touch an area."""
-    parts = list(parts)
-    owners = np.repeat(np.arange(len(parts)), [len(part.outlines) for part in parts])
-    outlines = [outline for part in parts for outline in part.outlines]
-    return [parts[k] for k in np.unique(owners[shapely.dwithin(area, outlines, OVERLAY_GAP_M)])]
+    rims = [(k, rim) for k, part in enumerate(parts) for rim in part.outlines]
+    is_near = shapely.dwithin(area, [rim for _, rim in rims], OVERLAY_GAP_M)
+    return [parts[k] for k in dict.fromkeys(rims[m][0] for m in np.flatnonzero(is_near))]
 
 
 def exclude_parts(parts: Iterable[Part], excluded: Iterable[Part]) -> list[Part]:
