@@ -30,8 +30,7 @@ REPLACES = 15  # Column that says whether it replaces what lies below.
 # First column of the leans: plane k is z = offset + slope (x + lean y) with x = u, -u, v, -v and y
 # the other of u, v.
 LEAN0 = 16
-SETTLED = 20  # Column: a digest of the surroundings in which no move was found for it.
-COLUMNS = 21  # Number of columns of a row.
+COLUMNS = 20  # Number of columns of a row.
 N_SIDES = 4  # Number of planes that slope.
 N_PLANES = 5  # Number of all planes.
 LEVEL = 4  # Number of the level plane.
