@@ -82,6 +82,3 @@ NEW_UNITS, NEW_MOVED_UNITS = 6.0, 1.0
 # How much the points of a place must cost for a volume to be looked for.
 
 ROOF_UNITS = 5.0  # of a roof that explains all but poorly
-
-# How nearly two roofs must cost the same to be one, and before the last volume is fitted in.
-SAME_UNITS, SAME_BEFORE_UNITS = 0.1, 2.0

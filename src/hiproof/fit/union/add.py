@@ -11,10 +11,7 @@ from ..prices import (
     FREELY_UNITS,
     NEW_MOVED_UNITS,
     NEW_UNITS,
-    REGROWN_UNITS,
     ROOF_UNITS,
-    SAME_BEFORE_UNITS,
-    SAME_UNITS,
 )
 from .around import measure_context
 from .candidates import SAME_SLOPE, find_best_rectangles
@@ -44,9 +41,9 @@ POORLY = 0.3
 CUT_LEAST_M = 0.3  # Least length (m) by which a neighbour is cut back for a new volume.
 CUT_MOST_SHARE = 0.6  # Largest share of a neighbour that is cut back for a new volume.
 
-# How adding ends: no candidate helps, nothing is left to explain (or the most additions were
-# tried), or a known roof has come back.
-NONE_HELPS, NOTHING_LEFT, ROOF_IS_KNOWN = range(3)
+# How adding ends: no candidate helps, or nothing is left to explain (or the most additions were
+# tried).
+NONE_HELPS, NOTHING_LEFT = range(2)
 
 # The data of growth: the scene, the cells (directions, n + g) between its lines along u and along v
 # in which points and unobserved cells lie, and the slopes (m,) to try for a further plane.
@@ -54,12 +51,10 @@ GrowthGrid = namedtuple("GrowthGrid", "scene cell_u cell_v slopes")
 
 
 @compiled
-def add_candidates(volumes, value, ground, candidates, additions, known_count, known_value):
+def add_candidates(volumes, value, ground, candidates, additions):
     """Add at most `additions` volumes, as long as a candidate helps.
 
-    Returns the volumes, their objective, how it ended, and how many may still be added. It also
-    ends when the roof has as many volumes as a known one (`known_count`, 0 without one) and costs
-    as much: nothing can be added to that roof.
+    Returns the volumes, their objective, how it ended, and how many may still be added.
     """
     scene = ground.scene
     while additions > 0:
@@ -72,23 +67,8 @@ def add_candidates(volumes, value, ground, candidates, additions, known_count, k
         trial, trial_value = find_best_addition(volumes, value, ground, candidates)
         if trial_value == np.inf:
             return volumes, value, NONE_HELPS, additions
-        if len(trial) == known_count and has_same_cost(
-            trial_value, known_value, scene, SAME_BEFORE_UNITS
-        ):
-            return trial, trial_value, ROOF_IS_KNOWN, additions
         volumes, value = improve(trial, scene, trial_value, ground.slopes, 1)
-        if len(volumes) == known_count and has_same_cost(value, known_value, scene, SAME_UNITS):
-            return volumes, value, ROOF_IS_KNOWN, additions
     return volumes, value, NOTHING_LEFT, 0
-
-
-@compiled
-def has_same_cost(value, known_value, scene, more_units):
-    """Return whether a roof costs as much as a known one.
-
-    It may cost `more_units` more, which fitting may still gain.
-    """
-    return -min(more_units, REGROWN_UNITS) < (value - known_value) / scene.unit < more_units
 
 
 @compiled

@@ -12,7 +12,6 @@ from ..prices import REGROWN_UNITS
 from .add import (
     FEWEST_UNEXPLAINED,
     NOTHING_LEFT,
-    ROOF_IS_KNOWN,
     GrowthGrid,
     add_candidates,
     find_unexplained,
@@ -79,9 +78,7 @@ def regrow_volumes(
         trial, trial_value = improve(
             trial, scene, compute_objective(trial, scene), ground.slopes, IMPROVING_ROUNDS
         )
-        trial, trial_value = grow_volumes(
-            trial, trial_value, ground, candidates, effort, (len(volumes), value)
-        )
+        trial, trial_value = grow_volumes(trial, trial_value, ground, candidates, effort)
         if trial_value < value - REGROWN_UNITS * scene.unit:
             volumes, value = trial, trial_value
         k = min(k, len(volumes)) - 1
@@ -94,21 +91,17 @@ def grow_volumes(
     ground: GrowthGrid,
     candidates: np.ndarray,
     effort: Effort,
-    known_roof: tuple[int, float] = (0, 0.0),
 ) -> tuple[np.ndarray, float]:
     """Add volumes as long as that pays, and improve them.
 
-    They are first those of the `candidates`, then those that the unexplained points suggest. It
-    ends when the roof has as many volumes as `known_roof` and costs as much.
+    They are first those of the `candidates`, then those that the unexplained points suggest.
     """
     scene, remaining, is_new = ground.scene, MOST_ADDITIONS, False
     while remaining > 0:
         n_before = remaining
         volumes, value, end, remaining = add_candidates(
-            volumes, value, ground, candidates, remaining, *known_roof
+            volumes, value, ground, candidates, remaining
         )
-        if end == ROOF_IS_KNOWN:
-            return volumes, value
         if end == NOTHING_LEFT or (is_new and remaining == n_before - 1):
             break
         volumes, value = improve(volumes, scene, value, ground.slopes, IMPROVING_ROUNDS)
