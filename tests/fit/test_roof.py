@@ -120,6 +120,15 @@ def test_a_move_that_was_tried_leaves_every_byte_of_the_roof(kind):
     assert [table.tobytes() for table in roof] == before
 
 
+@pytest.mark.parametrize("seed", [21, 33])  # of sixty, those that were cut along the ridge
+def test_the_slope_between_two_dormers_is_no_part(seed):
+    """They may be drawn as one, and the slope between them as a volume that replaces it."""
+    points, outline = scan_compound("dormered", seed, 5.0)
+    parts = fit_building(points, outline).roof_parts
+    assert [part.type for part in parts if part.type not in ("gable", "hip")] == ["flat", "flat"]
+    assert len(parts) == 3
+
+
 @pytest.mark.parametrize("kind", COMPOUND_KINDS)
 def test_a_drawing_shows_at_each_place_the_plane_that_is_visible_there(kind):
     roof, site, outline, _ = begin_roof(kind)

@@ -83,17 +83,22 @@ def end_at_others(
 ) -> set[int]:
     """End volumes where a plane begins that is hidden, or that another volume shows as its own.
 
-    A wing that ends in a roof may have that roof's plane as its end, but is a gable. Changes the
-    `regions` and `planes` of volumes and the owners of fragments, and returns which volumes end so.
+    A wing that ends in a roof may have that roof's plane as its end, but is a gable. What a volume
+    shows of another is a piece of that one. Changes the `regions` and `planes` of volumes and the
+    owners of fragments, and returns which volumes end so.
     """
     ended, owners = set(), drawing.owners[: drawing.count[0]]
     for k in range(len(regions)):
         for p in reversed(planes[k]):
+            same = np.argwhere(drawing.numbers[: len(regions)] == drawing.numbers[k, p])
+            others = [(j, q) for j, q in same.tolist() if j != k and q in planes[j]]
+            for j in find_pieces(roof, k, p, regions, planes, others):
+                regions[k] = list_polygons(unite([*regions[k], *regions[j]]))
+                owners[owners[:, 0] == j] = k, p
+                others, planes[j] = [other for other in others if other[0] != j], []
             if len(planes[k]) == 1:
                 break
             seen = np.flatnonzero((owners == (k, p)).all(axis=1))
-            same = np.argwhere(drawing.numbers[: len(regions)] == drawing.numbers[k, p])
-            others = [(j, q) for j, q in same.tolist() if j != k and q in planes[j]]
             if len(seen) and (taker := find_taker(roof, k, p, regions, planes, others)):
                 j, wide = taker
                 regions[j] = list_polygons(wide)
@@ -117,6 +122,27 @@ def end_at_others(
                 if len(seen):
                     owners[seen] = others[0]
     return ended
+
+
+def find_pieces(
+    roof: Tables,
+    k: int,
+    p: int,
+    regions: list[list[shapely.Polygon]],
+    planes: list[list[int]],
+    others: list[tuple[int, int]],
+) -> list[int]:
+    """Return the volumes of plane p alone that lie where volume k would show that plane.
+
+    A volume that replaces others uncovers such pieces, as between dormers that are drawn as one.
+    """
+    rest = np.delete(roof.planes[k, : roof.n_planes[k]], p, axis=0) - roof.planes[k, p]
+    place = draw_convex(np.concatenate([roof.half_planes[k], rest]))
+    return [
+        j
+        for j, q in others
+        if planes[j] == [q] and subtract(unite(regions[j]), place).area <= FRAGMENT_M2
+    ]
 
 
 def find_taker(
