@@ -12,7 +12,7 @@ from hiproof.fit.prices import (
     SLACK_UNITS,
     UNKNOWN_UNITS,
 )
-from hiproof.fit.union.add import NOTHING_LEFT, ROOF_IS_KNOWN, add_candidates, find_best_addition
+from hiproof.fit.union.add import NOTHING_LEFT, add_candidates, find_best_addition
 from hiproof.fit.union.around import (
     compute_roof_everywhere,
     compute_roof_with,
@@ -27,7 +27,7 @@ from hiproof.fit.union.candidates import (
 )
 from hiproof.fit.union.edges import move_edges
 from hiproof.fit.union.grow import prepare_growth
-from hiproof.fit.union.improve import digest_surroundings, improve
+from hiproof.fit.union.improve import improve
 from hiproof.fit.union.moves import (
     FEWEST_SEEDS,
     count_seeds,
@@ -544,24 +544,10 @@ def test_an_addition_is_one_volume_more_for_less(seed):
         assert len(extended) == len(start) + 1
         assert result < value
         assert is_true(extended, scene, result)
-        end = add_candidates(start, value, ground, candidates, 1, 0, 0.0)
+        end = add_candidates(start, value, ground, candidates, 1)
         assert end[1] <= result + 1e-9
         assert end[2:] == (NOTHING_LEFT, 0)
     assert find_best_addition(volumes, value, ground, candidates[:0])[1] == np.inf
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_adding_ends_where_a_known_roof_comes_back(seed):
-    _, _, scene = draw_case(seed)
-    ground, candidates = prepare_grid(scene)
-    base = make_base(float(scene.z.min()))
-    value = compute_objective(base, scene)
-    volumes, result, end, remainder = add_candidates(base, value, ground, candidates, 1, 0, 0.0)
-    second = add_candidates(base, value, ground, candidates, 5, len(volumes), result)
-    assert len(volumes) > 1
-    assert (end, remainder) == (NOTHING_LEFT, 0)
-    assert second[2] == ROOF_IS_KNOWN
-    assert len(second[0]) == len(volumes)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -614,21 +600,3 @@ def test_planes_with_too_few_seeds_gain_nothing_wherever_their_edge_lies():
                 assert seeds[plane] >= FEWEST_SEEDS or max(gains) == 0.0
     assert few
     assert many
-
-
-@pytest.mark.parametrize("other_direction", [0.0, 1.0])
-@pytest.mark.parametrize("seed", range(3))
-def test_the_surroundings_of_a_volume_are_what_is_near_it(seed, other_direction):
-    """A move of the volume or of one that meets it changes the digest.
-
-    A move of one far away does not until it comes near, whichever direction it has.
-    """
-    rng, turn = np.random.default_rng(seed), np.array([[1.0, 0.0], [0.0, 1.0]])
-    volumes = np.vstack([make_base(2.0), draw_volume(rng, 0.0), draw_volume(rng, 0.0)])
-    volumes[1:, DIRECTION] = (0.0, other_direction)
-    volumes[1:, U0 : V1 + 1] = [(-3.0, 3.0, -2.0, 2.0), (9.0, 14.0, -2.0, 2.0)]
-    digest = digest_surroundings(volumes, turn, 1)
-    for row, column, value, twin in ((2, V1, 4.0, True), (2, U0, 2.0, False), (1, V1, 2.1, False)):
-        moved = volumes.copy()
-        moved[row, column] = value
-        assert (digest_surroundings(moved, turn, 1) == digest) is twin
