@@ -76,6 +76,24 @@ def test_a_dormer_in_sparse_points_is_hardly_ever_unchanged(densities):
     assert classes["dormer"].count(Change.UNCHANGED) <= 6, classes["dormer"]
 
 
+@pytest.mark.parametrize("density", [2.0, 4.0, 8.0])
+def test_a_place_lowered_beside_one_that_the_model_leaves_out_is_not_unchanged(density):
+    """Its height is between those around it, as that of a wall, but it is no strip."""
+    roof, lowered, untouched = make_roof("flat", {"length": 14.0, "width": 9.0}).roof, [], []
+    for seed in range(24):
+        rng = np.random.default_rng(seed)
+        old, new, other = (scan(rng, roof, density) for _ in range(3))
+        x, y = rng.uniform((-5.0, -3.0), (1.0, 0.0))
+        for points, length, depth in ((old, 2.0, 3.0), (other, 2.0, 3.0), (new, 4.4, 2.4)):
+            local = turn_points(points[:, :2], -0.3) - (x, y)
+            inside = ((local > 0) & (local < (length, 3.0))).all(axis=1)
+            points[inside, 2] -= depth
+        lowered.append(judge((roof, old), new).change)
+        untouched.append(judge((roof, old), other).change)
+    assert untouched.count(Change.UNCHANGED) >= 23
+    assert lowered.count(Change.UNCHANGED) <= 4, lowered
+
+
 def list_changes(kind, count=6):
     """Buildings that allow a change of some kind, before and after it."""
     rng, pairs = np.random.default_rng(11), []

@@ -32,6 +32,10 @@ KEPT_SHARE = 0.25
 """Share of points on the other survey's surface from which on a cell contradicts
 nothing: a third of the pulses passes through a crown."""
 
+BLOCK_M, BLOCK_SHARE = 2.0, 0.75
+"""Side (m) of a square, and share of its cells that contradict the roof while none agrees, from
+which on no step explains it: a step that lies aside makes a strip."""
+
 HEIGHT_STEP_M = 1.0
 """Range (m) of the earlier heights around a cell from which on there is a step or a wall."""
 
@@ -71,14 +75,17 @@ class ChangedCells:
     is_surface: bool
 
 
-def find_clusters(comparison: CellComparison, stray: float = CELL_CHANCE) -> list[ChangedCells]:
+def find_clusters(
+    comparison: CellComparison, stray: float = CELL_CHANCE, has_blocks: bool = False
+) -> list[ChangedCells]:
     """Return the clusters of a building, the largest first.
 
     Cells that one survey left empty by chance do not part a cluster.
-    `stray` is the share of cells that contradict an unchanged roof.
+    `stray` is the share of cells that contradict an unchanged roof. With `has_blocks` whole blocks
+    of them do, whatever height lies around.
     """
     c = comparison
-    is_other, cells, result = flag_cells(c), int(c.is_compared.sum()), []
+    is_other, cells, result = flag_cells(c, has_blocks), int(c.is_compared.sum()), []
     for sign in (1.0, -1.0):
         for members in group_cells(c, is_other & (sign * c.difference > 0)):
             result.append(describe_cluster(c, members, cells, stray))
@@ -118,15 +125,27 @@ def forms_roof(points: np.ndarray) -> bool:
     return measure_roughness(points) < ROUGH_M and not is_strip(points)
 
 
-def flag_cells(comparison: CellComparison) -> np.ndarray:
-    """Return whether (k,) each cell contradicts the earlier roof."""
+def flag_cells(comparison: CellComparison, has_blocks: bool = False) -> np.ndarray:
+    """Return whether (k,) each cell contradicts the earlier roof, as in `find_clusters`."""
     c = comparison
     with np.errstate(invalid="ignore"):
         score = np.where(c.is_compared, np.abs(c.difference) / c.sigma, 0.0)
     result = (score > CELL_SIGMAS) & (np.maximum(c.kept, c.known) <= KEPT_SHARE)
     if result.any():
-        result[result] = ~is_known_around(c, np.flatnonzero(result))
+        doubted = np.flatnonzero(result & ~find_blocks(c, result) if has_blocks else result)
+        result[doubted] = ~is_known_around(c, doubted)
     return result
+
+
+def find_blocks(comparison: CellComparison, is_other: np.ndarray) -> np.ndarray:
+    """Return whether (k,) cells lie in a block of cells that are `is_other` (k,)."""
+    c, keys = comparison, comparison.cells.astype(np.int64) @ KEY_OF_CELL
+    side = max(2, round(BLOCK_M / c.cell_m))
+    inside = np.mgrid[:side, :side].reshape(2, -1).T @ KEY_OF_CELL
+    blocks = np.unique(keys[is_other, None] - inside)[:, None] + inside
+    is_full = np.isin(blocks, keys[is_other]).mean(axis=1) >= BLOCK_SHARE
+    is_full &= ~np.isin(blocks, keys[c.is_compared & ~is_other]).any(axis=1)
+    return is_other & np.isin(keys, blocks[is_full])
 
 
 def is_known_around(comparison: CellComparison, members: np.ndarray) -> np.ndarray:

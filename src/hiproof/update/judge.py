@@ -135,12 +135,13 @@ def judge_building(
         and c.area_m2 > max(beyond, SMALLEST_BARE_M2)
         and not passes_pulses(comparison, was_roof, on_ground, c.members)
     )
-    if not doubtful and comparison.cell_m > SMALL_CELL_M:
-        comparison = compare_points(roof, old, new, shift.noise, SMALL_CELL_M)
+    if not doubtful:
+        if comparison.cell_m > SMALL_CELL_M:
+            comparison = compare_points(roof, old, new, shift.noise, SMALL_CELL_M)
         doubtful = tuple(
             c
-            for c in find_clusters(comparison, shift.noise.stray)
-            if c.chance < significance and c.area_m2 >= DOUBTFUL_M2 and c.area_m2 > beyond
+            for c in find_clusters(comparison, shift.noise.stray, has_blocks=True)
+            if c.chance < significance and c.area_m2 >= max(DOUBTFUL_M2, beyond)
         )
     if doubtful:
         return ChangeVerdict(Change.UNCERTAIN, comparison, ground, doubtful[0].chance, doubtful)
