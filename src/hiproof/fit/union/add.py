@@ -15,7 +15,7 @@ from ..prices import (
 )
 from .around import measure_context
 from .candidates import SAME_SLOPE, find_best_rectangles
-from .edges import EVERYWHERE, NO_GAIN, move_edges
+from .edges import NO_GAIN, move_edges
 from .improve import improve
 from .objective import compute_costs, compute_objective_with
 from .refit import refit
@@ -185,5 +185,5 @@ def settle_new(volumes, scene, value, context):
         trial_value = compute_objective_with(volumes, scene, k, context)
         if trial_value > value + units * scene.unit:
             return volumes, np.inf
-        trial_value = move_edges(volumes, scene, k, trial_value, EVERYWHERE, context)
+        trial_value = move_edges(volumes, scene, k, trial_value, context)
     return volumes, trial_value if trial_value < value - NO_GAIN else np.inf

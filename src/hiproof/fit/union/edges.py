@@ -29,12 +29,11 @@ VERTEX_REACH_M = 1.5  # Corners of the outline within this distance (m) are plac
 SMALL_STEPS = 4  # Steps tried to either side of an edge.
 SMALL_STEP_M = 0.1  # Length of such a step (m).
 NO_GAIN = 1e-6  # Change of the objective that is numerically none.
-EVERYWHERE = 60.0  # Reach (m) beyond which no place for an edge lies.
 
 
 @compiled
-def move_edges(volumes, scene, k, value, reach, context):
-    """Move each edge of volume k to its best place within `reach`, in place.
+def move_edges(volumes, scene, k, value, context):
+    """Move each edge of volume k to its best place, in place.
 
     Returns the objective.
     """
@@ -67,7 +66,7 @@ def move_edges(volumes, scene, k, value, reach, context):
         best, best_place = value - NO_GAIN, start
         for q in range(m):
             t = places[q]
-            if abs(t - start) > reach or sign * (t - opposite) <= 0.0:
+            if sign * (t - opposite) <= 0.0:
                 continue
             p = find_place(distance, sign * t)
             while p < len(distance) and distance[p] == sign * t:

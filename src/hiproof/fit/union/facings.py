@@ -11,7 +11,7 @@ import numpy as np
 from ...compiled import compiled
 from ..prices import FREE_UNITS
 from .around import is_visible_at
-from .edges import EVERYWHERE, NO_GAIN
+from .edges import NO_GAIN
 from .moves import settle_move
 from .objective import compute_objective_with
 from .refit import refit
@@ -65,7 +65,7 @@ def face_walls(volumes, scene, value, k, context):
         best, best_value = face_freely(best, scene, best_value, k, axis, context)
         if best_value < value - NO_GAIN:
             volumes, value = best, best_value
-            trial, trial_value = settle_move(volumes.copy(), scene, k, value, EVERYWHERE, context)
+            trial, trial_value = settle_move(volumes.copy(), scene, k, value, context)
             if trial_value < np.inf:
                 volumes, value = trial, trial_value
     return volumes, value

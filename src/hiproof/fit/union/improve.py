@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ...compiled import compiled
 from .around import measure_context
-from .edges import EVERYWHERE, NO_GAIN, move_edges
+from .edges import NO_GAIN, move_edges
 from .facings import face_walls
 from .moves import (
     add_planes,
@@ -31,7 +31,7 @@ def improve(volumes, scene, value, slopes, rounds):
             volumes, value = refit_volume(volumes, scene, value, k, context)
         for k in range(1, len(volumes)):
             context = measure_context(volumes, scene.U, scene.V, k)
-            value = move_edges(volumes, scene, k, value, EVERYWHERE, context)
+            value = move_edges(volumes, scene, k, value, context)
         volumes, value = drop_volumes(volumes, scene, value)
         for k in range(1, len(volumes)):
             volumes, value = change_planes(volumes, scene, value, k, slopes)
@@ -60,5 +60,5 @@ def drop_base(volumes, scene, value):
     trial[0, OFFSET0 + LEVEL] = scene.low - 0.7
     trial_value = compute_objective(trial, scene)
     if trial_value < value + 0.3 * scene.n:
-        trial_value = move_all_edges(trial, scene, trial_value, EVERYWHERE)
+        trial_value = move_all_edges(trial, scene, trial_value)
     return (trial, trial_value) if trial_value < value - NO_GAIN else (volumes, value)

@@ -18,7 +18,7 @@ import numpy as np
 from ...compiled import compiled
 from ..prices import BEGIN_SHARE, BEGIN_UNITS, UNKNOWN_UNITS
 from .around import compute_roof_everywhere, compute_roof_with, measure_context
-from .edges import BEYOND_OUTLINE_M, EVERYWHERE, NO_GAIN, move_edges
+from .edges import BEYOND_OUTLINE_M, NO_GAIN, move_edges
 from .objective import compute_objective, compute_objective_with, compute_point_cost
 from .refit import refit
 from .volumes import (
@@ -52,7 +52,7 @@ POINTS_AT_ONCE = 64  # Points between two checks whether a new plane can still b
 
 
 @compiled
-def settle_move(trial, scene, k, value, reach, context):
+def settle_move(trial, scene, k, value, context):
     """Refit volume k of `trial`, move its edges, and refit it again.
 
     Also returns the objective, infinite if it is not below `value`.
@@ -61,7 +61,7 @@ def settle_move(trial, scene, k, value, reach, context):
     trial_value = compute_objective_with(trial, scene, k, context)
     if trial_value > value + BEGIN_UNITS * scene.unit + BEGIN_SHARE * scene.n:
         return trial, np.inf
-    trial_value = move_edges(trial, scene, k, trial_value, reach, context)
+    trial_value = move_edges(trial, scene, k, trial_value, context)
     trial, trial_value = refit_volume(trial, scene, trial_value, k, context)
     return (trial, trial_value) if trial_value < value - NO_GAIN else (trial, np.inf)
 
@@ -91,11 +91,11 @@ def refit_volume(volumes, scene, value, k, context):
 
 
 @compiled
-def move_all_edges(volumes, scene, value, reach):
+def move_all_edges(volumes, scene, value):
     """Move the edges of every volume, in place."""
     for k in range(1, len(volumes)):
         context = measure_context(volumes, scene.U, scene.V, k)
-        value = move_edges(volumes, scene, k, value, reach, context)
+        value = move_edges(volumes, scene, k, value, context)
     return value
 
 
@@ -123,7 +123,7 @@ def drop_planes(volumes, scene, value, k, context):
         trial[k, OFFSET0 + plane] = np.inf
         if plane < LEVEL:
             trial[k, SLOPE0 + plane] = trial[k, LEAN0 + plane] = 0.0
-        trial, trial_value = settle_move(trial, scene, k, value, EVERYWHERE, context)
+        trial, trial_value = settle_move(trial, scene, k, value, context)
         if trial_value < np.inf:
             volumes, value = trial, trial_value
     return volumes, value
@@ -135,7 +135,7 @@ def change_ties(volumes, scene, value, k, context):
     if volumes[k, REPLACES] > 0.0:
         trial = volumes.copy()
         trial[k, REPLACES] = 0.0
-        trial, trial_value = settle_move(trial, scene, k, value, EVERYWHERE, context)
+        trial, trial_value = settle_move(trial, scene, k, value, context)
         if trial_value < np.inf:
             volumes, value = trial, trial_value
     for tie in range(3):
@@ -146,7 +146,7 @@ def change_ties(volumes, scene, value, k, context):
         if count_slopes(trial[k]) == count_slopes(volumes[k]):
             continue
         equalise_slopes(trial[k])
-        trial, trial_value = settle_move(trial, scene, k, value, 0.6, context)
+        trial, trial_value = settle_move(trial, scene, k, value, context)
         if trial_value < np.inf:
             volumes, value = trial, trial_value
     return volumes, value
@@ -196,7 +196,7 @@ def add_planes(volumes, scene, value, k, slopes, context):
                 trial[k, SLOPE0 + plane] = slope
             trial[k, TIE] = tie
             equalise_slopes(trial[k])
-            trial, trial_value = settle_move(trial, scene, k, value, EVERYWHERE, context)
+            trial, trial_value = settle_move(trial, scene, k, value, context)
             if trial_value < np.inf:
                 volumes, value = trial, trial_value
                 z_now = compute_roof_with(volumes, scene.U, scene.V, k, context)
