@@ -106,7 +106,7 @@ def compile_half(half: str) -> None:
         fit_shapes(parts, points, outline, settings)
         return
     for whole in wholes:
-        find_volumes(whole, settings.compound)
+        find_volumes(whole)
     PointGrid(points).inside(outline)
     network = "auto" if find_spec("onnxruntime") else "never"
     one = Settings().replace({"fit": {"parts": "one"}, "segment": {"network": network}})

@@ -41,7 +41,7 @@ from ..union.fit import BuildingFit
 from ..union.outline import draw_outline
 from ..union.plan import Plan, lay_out_plan
 from ..union.scene import VISIBLE_DEPTH_M, place_nodes
-from ..union.search import SEARCH_POINTS, find_volumes, lay_out_whole
+from ..union.search import count_search_points, find_volumes, lay_out_whole
 from ..union.whole import Whole
 from .accept import LOOP_ROUNDS, improve
 from .add import add_volumes
@@ -93,7 +93,7 @@ def fit_building(
     types = settings.fit.types
     whole = lay_out_whole(plan, outline, settings.compound, types)
     xy = plan.frame.xy_local(np.column_stack(place_nodes(whole.scene, VISIBLE_DEPTH_M)))
-    drawn, price = draw_parts(find_volumes(whole, settings.compound), whole, settings)
+    drawn, price = draw_parts(find_volumes(whole), whole, settings)
     visible = keep_visible(drawn, xy)
     has_teeth = not types or "shed" in types
     parts = unite_saw_teeth(visible) if has_teeth else visible
@@ -126,7 +126,9 @@ def find_roof(volumes: np.ndarray, whole: Whole, site: Site) -> tuple[Tables, fl
     roof = start_roof(volumes, whole.scene.turn, site)
     trial, drawing = make_tables_like(roof), make_drawing(len(roof.sides))
     price = improve(roof, trial, site, drawing, np.ones(len(roof.sides), np.bool_), LOOP_ROUNDS)
-    is_thinned = whole.scene.n > SEARCH_POINTS  # else the search has seen every point
+    is_thinned = whole.scene.n > count_search_points(
+        whole.area
+    )  # else the search has seen every point
     if is_thinned and (added := add_volumes(roof, trial, site, drawing, whole)).any():
         price = improve(roof, trial, site, drawing, added, LOOP_ROUNDS)
     return roof, price

@@ -15,7 +15,7 @@ import numpy as np
 from ..union.add import FEWEST_UNEXPLAINED, UNEXPLAINED
 from ..union.candidates import (
     MOST_NEW_PLANES,
-    Effort,
+    POOL_POINTS,
     find_best_rectangles,
     list_candidates,
 )
@@ -37,7 +37,6 @@ AROUND = 2  # Squares around one that count, too.
 MOST_PLACES = 10  # Most places of a roof that are tried: a limit on time.
 PLACE_UNITS = 4.0  # Units that the points must be worth that a place leaves unexplained.
 WINDOW_M = 20.0  # Size (m) of a place's window.
-EFFORT = Effort(pool_points=1200, seeds=200, regrown=0)
 TRIED = 2  # Candidates that join, and that replace, those that gain most.
 ROWS = np.array([1, 16, 16])  # Most volumes, lines and unknowns that a new volume takes.
 
@@ -51,7 +50,7 @@ def add_volumes(
     """
     known, windows = know(roof, drawing, site), []
     for box in list_places(roof, site):
-        scene, start, last = open_window(whole, box, EFFORT.pool_points), known, None
+        scene, start, last = open_window(whole, box, POOL_POINTS), known, None
         while scene is not None and known is not last:
             last, known = known, add_best(roof, trial, site, drawing, scene, box, known)
         if known is not start:
@@ -124,7 +123,7 @@ def list_volumes(roof: Tables, scene: Scene) -> Iterator[np.ndarray]:
     unexplained = np.flatnonzero(costs[: scene.n] > UNEXPLAINED)
     if len(unexplained) < FEWEST_UNEXPLAINED:
         return
-    candidates = list_candidates(scene, unexplained, MOST_NEW_PLANES, EFFORT)
+    candidates = list_candidates(scene, unexplained, MOST_NEW_PLANES)
     ground = prepare_growth(scene, candidates)
     for replaces in (False, True):
         gains, rectangles = find_best_rectangles(

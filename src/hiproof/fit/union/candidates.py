@@ -5,8 +5,6 @@ They are made of the planes and gables that explain rectangles of points.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from ...compiled import compiled
@@ -53,27 +51,11 @@ WRONG_COVER = 0.02  # Price (points) of covering a point without explaining it.
 # Most planes that are found, of all points and of those that a roof leaves unexplained. Structure
 # that explains less stays unseen.
 MOST_PLANES, MOST_NEW_PLANES = 16, 10
+POOL_POINTS = 1200  # Most points among which candidates are found: a limit on time.
+SEEDS = 200  # Most points around which planes are fitted: another.
 
 
-class Effort(NamedTuple):
-    """How much is searched: limits on time.
-
-    `pool_points` are the points among which candidates are found, and `seeds` those around which
-    planes are fitted. The first `regrown` volumes are grown anew: of 40 that were better anew, none
-    had grown later.
-    """
-
-    pool_points: int
-    seeds: int
-    regrown: int
-
-
-HOUSE = Effort(pool_points=500, seeds=100, regrown=3)
-
-
-def list_candidates(
-    scene: Scene, members: np.ndarray, most_planes: int, effort: Effort = HOUSE
-) -> np.ndarray:
+def list_candidates(scene: Scene, members: np.ndarray, most_planes: int) -> np.ndarray:
     """List volumes (m, COLUMNS) without rectangles that points suggest.
 
     They have allowed shapes, in every direction. The points are `members` (k,).
@@ -81,7 +63,7 @@ def list_candidates(
     grids = enumerate(make_grids(scene))
     return np.concatenate(
         [
-            list_candidates_along(scene, members, direction, grid, most_planes, effort)
+            list_candidates_along(scene, members, direction, grid, most_planes)
             for direction, grid in grids
         ]
     )
@@ -93,14 +75,14 @@ def make_grids(scene: Scene) -> list[Grid]:
 
 
 def list_candidates_along(
-    scene: Scene, members: np.ndarray, direction: int, grid: Grid, most_planes: int, effort: Effort
+    scene: Scene, members: np.ndarray, direction: int, grid: Grid, most_planes: int
 ) -> np.ndarray:
     """List the candidates (m, COLUMNS) in one direction.
 
     They are made of every plane of the pool, turned along an axis if necessary, of gables, of all
     pairs that form a ridge, and of larger groups of these.
     """
-    count = min(len(members), effort.pool_points)
+    count = min(len(members), POOL_POINTS)
     numbers = members[np.arange(count) * len(members) // count]
     u, v, z = (
         np.ascontiguousarray(x[numbers]) for x in (scene.U[direction], scene.V[direction], scene.z)
@@ -110,7 +92,7 @@ def list_candidates_along(
     pool = pool_planes(
         cloud,
         grid,
-        list_hypotheses(cloud, effort.seeds),
+        list_hypotheses(cloud, SEEDS),
         tolerance,
         unit,
         most_planes,

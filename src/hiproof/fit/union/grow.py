@@ -17,38 +17,36 @@ from .add import (
     find_unexplained,
 )
 from .candidates import (
-    HOUSE,
     MOST_NEW_PLANES,
     MOST_PLANES,
-    Effort,
     list_candidates,
     make_grids,
 )
 from .improve import improve
 from .moves import MOST_TYPICAL_SLOPES, remove_volume
 from .objective import compute_objective
-from .plan import MIN_STRUCTURE_POINTS, find_cells
+from .plan import find_cells
 from .scene import Scene
 from .volumes import N_SIDES, OFFSET0, SLOPE0, make_base
 
 MOST_ADDITIONS = 20  # Most additions tried for one building: a limit on time.
 # Quantile of the heights at which the base lies: below all roofs but not below a stray point.
 BASE_QUANTILE = 0.02
+REGROWN = 1  # Volumes, the first ones, that are grown anew.
 IMPROVING_ROUNDS = 2  # Most rounds of all moves where no volume is added.
 
 
-def grow(scene: Scene, effort: Effort = HOUSE) -> tuple[np.ndarray, float]:
+def grow(scene: Scene) -> tuple[np.ndarray, float]:
     """Grow volumes (k, COLUMNS) from the base, and regrow the first of them.
 
     Also returns their objective.
     """
-    quantile = BASE_QUANTILE if scene.n >= MIN_STRUCTURE_POINTS else 0.5
-    place = int(quantile * (scene.n - 1))
+    place = int(BASE_QUANTILE * (scene.n - 1))
     base = make_base(float(np.partition(scene.z[: scene.n], place)[place]))
-    candidates = list_candidates(scene, np.arange(scene.n), MOST_PLANES, effort)
+    candidates = list_candidates(scene, np.arange(scene.n), MOST_PLANES)
     ground = prepare_growth(scene, candidates)
-    volumes, value = grow_volumes(base, compute_objective(base, scene), ground, candidates, effort)
-    return regrow_volumes(volumes, value, ground, candidates, effort)
+    volumes, value = grow_volumes(base, compute_objective(base, scene), ground, candidates)
+    return regrow_volumes(volumes, value, ground, candidates)
 
 
 def prepare_growth(scene: Scene, candidates: np.ndarray) -> GrowthGrid:
@@ -64,7 +62,6 @@ def regrow_volumes(
     value: float,
     ground: GrowthGrid,
     candidates: np.ndarray,
-    effort: Effort = HOUSE,
 ) -> tuple[np.ndarray, float]:
     """Take out each of the first volumes in turn, and grow anew what is missing.
 
@@ -72,13 +69,13 @@ def regrow_volumes(
     what follows fits in around it: two hips of one pitch begin as one volume over both. Without it,
     the others take their own places.
     """
-    k, scene = min(len(volumes) - 1, effort.regrown), ground.scene
+    k, scene = min(len(volumes) - 1, REGROWN), ground.scene
     while k > 0 and len(volumes) > 2:
         trial = remove_volume(volumes, k)
         trial, trial_value = improve(
             trial, scene, compute_objective(trial, scene), ground.slopes, IMPROVING_ROUNDS
         )
-        trial, trial_value = grow_volumes(trial, trial_value, ground, candidates, effort)
+        trial, trial_value = grow_volumes(trial, trial_value, ground, candidates)
         if trial_value < value - REGROWN_UNITS * scene.unit:
             volumes, value = trial, trial_value
         k = min(k, len(volumes)) - 1
@@ -90,7 +87,6 @@ def grow_volumes(
     value: float,
     ground: GrowthGrid,
     candidates: np.ndarray,
-    effort: Effort,
 ) -> tuple[np.ndarray, float]:
     """Add volumes as long as that pays, and improve them.
 
@@ -109,7 +105,7 @@ def grow_volumes(
         if len(unexplained_points) < FEWEST_UNEXPLAINED:
             break
         candidates, is_new = (
-            list_candidates(scene, unexplained_points, MOST_NEW_PLANES, effort),
+            list_candidates(scene, unexplained_points, MOST_NEW_PLANES),
             True,
         )
     return improve(volumes, scene, value, ground.slopes, IMPROVING_ROUNDS)

@@ -137,37 +137,6 @@ def make_scene(
     )
 
 
-def thin_scene(scene: Scene, numbers: np.ndarray, unit: float) -> Scene:
-    """Return the scene with only the points `numbers` (m,).
-
-    Unobserved cells weigh as many of them. What comes from the outline is shared.
-    """
-    if len(numbers) == scene.n:
-        return scene._replace(unit=unit)
-    thinned = select_points(scene, np.append(numbers, np.arange(scene.n, len(scene.z))))
-    thinned.weight[thinned.n :] *= thinned.n / scene.n
-    return thinned._replace(
-        order=sort_along(thinned.U, thinned.V),
-        shade=thinned.shade * (thinned.n / scene.n),
-        unit=unit,
-    )
-
-
-def select_points(scene: Scene, numbers: np.ndarray) -> Scene:
-    """Return the scene of some of its points and cells, by ascending `numbers` (m,).
-
-    `order` stays that of the whole.
-    """
-    return scene._replace(
-        U=scene.U.take(numbers, axis=1),
-        V=scene.V.take(numbers, axis=1),
-        z=scene.z[numbers],
-        weight=scene.weight[numbers],
-        shade=scene.shade[numbers],
-        n=int(np.count_nonzero(numbers < scene.n)),
-    )
-
-
 def sort_along(U: np.ndarray, V: np.ndarray) -> np.ndarray:
     """Return the points' numbers in ascending order along each axis of each direction.
 

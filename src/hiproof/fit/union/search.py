@@ -1,6 +1,7 @@
-"""Search the volumes of a plan.
+"""Search the volumes of a plan, block by block.
 
-Structure is searched with some of the points, and fitted again to all of them.
+Structure is searched with some of the points of a block, and fitted again to nearly all. The loop
+over moves makes one roof of what meets along the cuts.
 """
 
 from __future__ import annotations
@@ -10,19 +11,22 @@ import shapely
 
 from ..prices import compute_unit
 from .allowed import list_allowed_shapes
-from .blocks import HeightRaster
+from .blocks import BLOCK_M2, HeightRaster, find_cheapest_cut
 from .grow import grow
-from .large import search_box
 from .moves import refit_volumes
 from .objective import compute_objective, is_base_visible
 from .plan import Plan
-from .scene import find_directions, make_scene, thin_scene
+from .scene import find_directions, make_scene
 from .trim import trim
-from .volumes import make_base
-from .whole import Whole
+from .volumes import U0, V1, make_base
+from .whole import Box, Whole, clip_to_box
+from .window import end_at_border, open_window
 
-SEARCH_POINTS = 600  # Points in which structure is searched.
-LARGE_ROOF_M2 = 200.0  # Area (m2) from which on a roof is searched block by block.
+# Points of a block in which structure is searched, a square metre and at least.
+SEARCH_DENSITY, LEAST_SEARCH_POINTS = 2.7, 600
+# Points of a block to which its planes are fitted again: 5 per square metre of the largest block.
+FULL_POINTS = 3000
+LEAST_HALF_M2 = 1.0  # Least area (m2) of outline on either side of a cut.
 
 
 def lay_out_whole(
@@ -39,16 +43,67 @@ def lay_out_whole(
     return Whole(scene, plan, outline)
 
 
-def find_volumes(whole: Whole, settings) -> np.ndarray:
-    """Find the volumes (k, COLUMNS) of a roof. `settings` are those of [compound]."""
-    scene, count = whole.scene, whole.scene.n
-    if whole.area > LARGE_ROOF_M2 and count > SEARCH_POINTS:
-        blocks = search_box(whole, HeightRaster(whole), whole.box, whole.area)
-        return np.concatenate(blocks or [make_base(float(whole.z.min()))])
-    numbers = np.arange(min(count, SEARCH_POINTS)) * count // min(count, SEARCH_POINTS)
-    density = whole.plan.density * len(numbers) / count
-    thinned = thin_scene(scene, numbers, compute_unit(density, settings))
-    volumes, _ = grow(thinned)
-    volumes, value = refit_volumes(volumes, scene, compute_objective(volumes, scene))
-    volumes, _ = trim(volumes, scene, value)
-    return volumes if is_base_visible(volumes, scene) else volumes[1:]
+def find_volumes(whole: Whole) -> np.ndarray:
+    """Find the volumes (k, COLUMNS) of a roof."""
+    blocks = search_box(whole, HeightRaster(whole), whole.box, whole.area)
+    return np.concatenate(blocks or [make_base(float(np.sort(whole.z)[(len(whole.z) - 1) // 2]))])
+
+
+def count_search_points(area_m2: float) -> int:
+    """Return how many points of a block are searched at most."""
+    return max(LEAST_SEARCH_POINTS, int(SEARCH_DENSITY * area_m2))
+
+
+def search_box(whole: Whole, raster: HeightRaster, box: Box, area_m2: float) -> list[np.ndarray]:
+    """Return the volumes of each block of a box that holds so much of the outline."""
+    cut = find_cheapest_cut(raster, box) if area_m2 > BLOCK_M2 else None
+    halves = box.split(cut[0], find_step(whole, box, *cut, raster.pitch)) if cut else (box, box)
+    areas = [clip_to_box(whole.outline, half).area for half in halves]
+    if cut is None or min(areas) < LEAST_HALF_M2:
+        return search_block(whole, box, area_m2)
+    return [
+        block
+        for half, area in zip(halves, areas, strict=True)
+        for block in search_box(whole, raster, half, area)
+    ]
+
+
+def find_step(whole: Whole, box: Box, axis: int, place: float, pitch: float) -> float:
+    """Return where within two cells of a cut, at a `place` of an axis, heights change most.
+
+    The squares of heights about their means on both sides have the least sum there.
+    """
+    strip = box.split(axis, place + 2 * pitch)[0].split(axis, place - 2 * pitch)[1]
+    numbers = whole.find_points(strip)
+    x = (whole.u, whole.v)[axis][numbers]
+    order = np.argsort(x, kind="stable")
+    x, z = x[order], whole.z[numbers[order]]
+    if len(x) < 2:
+        return place
+    before = np.arange(1, len(x))
+    sums = np.cumsum(z)[:-1]
+    spread = sums**2 / before + (z.sum() - sums) ** 2 / (len(x) - before)
+    q = int(np.argmax(spread))
+    return float(0.5 * (x[q] + x[q + 1]))
+
+
+def search_block(whole: Whole, box: Box, area_m2: float) -> list[np.ndarray]:
+    """Return the volumes of a block, which end where it does, in a list.
+
+    It is searched by itself, its own base first. The list is empty for hardly a point.
+    """
+    most = count_search_points(area_m2)
+    scene = full = open_window(whole, box, most)
+    if scene is not None and scene.n == most:
+        full = open_window(whole, box, FULL_POINTS)
+    if scene is None or full is None:
+        return []
+    volumes, _ = grow(scene)
+    volumes, value = refit_volumes(volumes, full, compute_objective(volumes, full))
+    volumes, _ = trim(volumes, full, value)
+    is_alone = box == whole.box
+    if not is_base_visible(volumes, full, count_points=not is_alone):
+        volumes = volumes[1:]
+    elif not is_alone:
+        volumes[0, U0 : V1 + 1] = box
+    return [volumes if is_alone else end_at_border(whole, volumes, box)]
