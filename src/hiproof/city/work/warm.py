@@ -85,8 +85,9 @@ def compile_half(half: str) -> None:
     from ...fit.shapes.curved import fit_shapes
     from ...fit.union.outline import draw_outline
     from ...fit.union.plan import lay_out_plan
-    from ...fit.union.search import find_volumes, lay_out_whole
+    from ...fit.union.search import find_volumes
     from ...fit.union.volumes import make_base
+    from ...fit.union.whole import lay_out_whole
     from ...geometry.point_grid import PointGrid
     from ...method import reconstruct
     from ...simulate import random_compound, uniform_points

@@ -37,12 +37,12 @@ from ..shapes.curved import fit_shapes
 from ..shapes.regions import exclude_parts, list_polygons
 from ..shapes.shown import find_highest, keep_visible
 from ..shapes.teeth import unite_saw_teeth
+from ..union.depth import VISIBLE_DEPTH_M
 from ..union.fit import BuildingFit
 from ..union.outline import draw_outline
 from ..union.plan import Plan, lay_out_plan
-from ..union.scene import VISIBLE_DEPTH_M, place_nodes
-from ..union.search import count_search_points, find_volumes, lay_out_whole
-from ..union.whole import Whole
+from ..union.search import count_search_points, find_volumes
+from ..union.whole import Whole, lay_out_whole
 from .accept import LOOP_ROUNDS, improve
 from .add import add_volumes
 from .deviations import estimate_covariance, estimate_side_sigmas, find_anchored
@@ -84,7 +84,7 @@ def fit_building(
     outline = draw_outline(points_local) if outline is None else outline
     outline = select_largest_polygon(outline)
     plan = lay_out_plan(points_local, outline)
-    if len(plan.cloud.u) == 0:
+    if plan.uvz.shape[1] == 0:
         raise FitError(
             "expected roof points inside the outline, got none; "
             "add a cloud that covers the building"
@@ -92,7 +92,7 @@ def fit_building(
     settings = settings or Settings()
     types = settings.fit.types
     whole = lay_out_whole(plan, outline, settings.compound, types)
-    xy = plan.frame.xy_local(np.column_stack(place_nodes(whole.scene, VISIBLE_DEPTH_M)))
+    xy = plan.frame.xy_local(whole.raster.list_nodes(VISIBLE_DEPTH_M).T)
     drawn, price = draw_parts(find_volumes(whole), whole, settings)
     visible = keep_visible(drawn, xy)
     has_teeth = not types or "shed" in types
@@ -102,7 +102,7 @@ def fit_building(
     if exclude_parts(parts, visible):  # new ones may hide others
         parts = keep_visible(parts, xy, widest_m2=0.0)
     unexplained = measure_unexplained_share(parts, plan, settings.compound.tolerance_m)
-    return BuildingFit(tuple(parts), outline, price, whole.scene.n, unexplained)
+    return BuildingFit(tuple(parts), outline, price, plan.uvz.shape[1], unexplained)
 
 
 def draw_parts(volumes: np.ndarray, whole: Whole, settings: Settings) -> tuple[list[Part], float]:
@@ -112,7 +112,7 @@ def draw_parts(volumes: np.ndarray, whole: Whole, settings: Settings) -> tuple[l
     """
     plan, types = whole.plan, settings.fit.types
     keeps_shapes = bool(types) and not {*CATALOGUE} <= {*types, *CURVED}
-    site = make_site(whole.scene, whole.outline, plan.border, keeps_shapes)
+    site = make_site(whole, keeps_shapes)
     roof, price = find_roof(volumes, whole, site)
     return read_parts(roof, site, whole.outline, plan, types), price
 
@@ -123,12 +123,11 @@ def find_roof(volumes: np.ndarray, whole: Whole, site: Site) -> tuple[Tables, fl
     It begins with volumes (k, COLUMNS). More are added where points are unexplained, if the search
     has not seen all of them.
     """
-    roof = start_roof(volumes, whole.scene.turn, site)
+    roof = start_roof(volumes, whole.turn, site)
     trial, drawing = make_tables_like(roof), make_drawing(len(roof.sides))
     price = improve(roof, trial, site, drawing, np.ones(len(roof.sides), np.bool_), LOOP_ROUNDS)
-    is_thinned = whole.scene.n > count_search_points(
-        whole.area
-    )  # else the search has seen every point
+    # Else the search has seen every point.
+    is_thinned = whole.plan.uvz.shape[1] > count_search_points(whole.outline.area)
     if is_thinned and (added := add_volumes(roof, trial, site, drawing, whole)).any():
         price = improve(roof, trial, site, drawing, added, LOOP_ROUNDS)
     return roof, price
@@ -170,9 +169,9 @@ def select_largest_polygon(outline: shapely.Geometry) -> shapely.Polygon:
 
 def measure_unexplained_share(parts: list[Part], plan: Plan, tolerance_m: float) -> float:
     """Return the share of points further than `tolerance_m` from the highest part."""
-    xy = plan.frame.xy_local(np.column_stack([plan.cloud.u, plan.cloud.v]))
+    xy = plan.frame.xy_local(plan.uvz[:2].T)
     z, _ = find_highest(parts, xy)
-    return float(np.mean(np.abs(z - plan.frame.origin[2] - plan.cloud.z) > tolerance_m))
+    return float(np.mean(np.abs(z - plan.frame.origin[2] - plan.uvz[2]) > tolerance_m))
 
 
 def restrict_type(part: Part, types: tuple[str, ...], points: np.ndarray) -> Part:

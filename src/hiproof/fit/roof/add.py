@@ -21,10 +21,9 @@ from ..union.candidates import (
 )
 from ..union.grow import prepare_growth
 from ..union.objective import compute_costs
-from ..union.scene import Scene
+from ..union.scene import Scene, open_window
 from ..union.volumes import DIRECTION, REPLACES, U0
 from ..union.whole import Box, Whole
-from ..union.window import open_window
 from .accept import LEAST_UNITS, improve_new
 from .copies import add_copy, list_copies
 from .draw import Drawing, compute_heights

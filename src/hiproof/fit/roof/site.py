@@ -8,6 +8,9 @@ import shapely
 from ...geometry.point_in_polygon import find_inside
 from ...geometry.rings import ring_edges
 from ..prices import DEAD_M, NARROW_M
+from ..union.plan import HEIGHT_MARGIN_M
+from ..union.scene import lay_grid, lay_unobserved_cells
+from ..union.whole import Whole
 from .draw import RING_CORNERS
 from .price import Site
 
@@ -21,23 +24,21 @@ BAY_POINTS = 3  # Fewer points show no height.
 CONVEX_PART_M2 = 1e-6  # Area (m2) of the smallest part.
 
 
-def make_site(
-    scene, outline: shapely.Polygon, border: np.ndarray, keeps_shapes: bool = False
-) -> Site:
-    """Return the site of an `outline` (plan coordinates) with the points of a scene.
+def make_site(whole: Whole, keeps_shapes: bool = False) -> Site:
+    """Return the site of a building.
 
-    Of the points (3, b) beside the `border`, which may be on walls, those in bays count.
+    Of the points beside the border, which may be on walls, those in bays count.
     """
-    points = np.array([scene.U[0, : scene.n], scene.V[0, : scene.n], scene.z[: scene.n]])
+    outline, points, border = whole.outline, whole.plan.uvz, whole.plan.border
     bays, heights, in_bay = list_bays(outline, np.hstack([points, border]).T)
-    points = np.hstack([points, border[:, in_bay[scene.n :]]])
+    density, (low, high) = points.shape[1] / outline.area, np.sort(points[2])[[0, -1]]
+    grid = lay_grid(shapely.get_coordinates(outline), density)
+    cells = lay_unobserved_cells(whole, grid[0], grid[1], points, density)  # ascending by u
+    points = np.hstack([points, border[:, in_bay[points.shape[1] :]]])
     points = points[:, np.argsort(points[0], kind="stable")]
-    n, cells = points.shape[1], scene.n + np.argsort(scene.U[0, scene.n :], kind="stable")
-    x = np.concatenate([points[0], scene.U[0, cells]])
-    y = np.concatenate([points[1], scene.V[0, cells]])
-    z = np.concatenate([points[2], scene.z[cells]])
-    weight = np.concatenate([np.ones(n), scene.weight[cells]])
-    shade = np.concatenate([np.zeros(n), scene.shade[cells]])
+    n, nothing = points.shape[1], np.zeros(cells.shape[1])
+    x, y, z = np.hstack([points, [*cells[:2], nothing]])
+    weight, shade = np.hstack([[np.ones(n), np.zeros(n)], cells[2:]])
     rings = split_convex(outline)
     parts, sizes = np.zeros((len(rings), RING_CORNERS, 2)), np.array([len(r) for r in rings])
     for part, ring in zip(parts, rings, strict=True):
@@ -51,11 +52,11 @@ def make_site(
         weight,
         shade,
         n,
-        scene.low,
-        scene.high,
+        low - HEIGHT_MARGIN_M,
+        high + HEIGHT_MARGIN_M,
         DEAD_M,
-        scene.width,
-        scene.unit,
+        whole.width,
+        whole.unit,
         parts,
         sizes,
         boxes,

@@ -35,15 +35,16 @@ class HeightRaster:
     def __init__(self, whole: Whole):
         self.box = whole.box
         self.pitch = max(HEIGHT_CELL_M, HEIGHT_CELL_SPACINGS / math.sqrt(whole.plan.density))
-        i = ((whole.u - self.box.u0) / self.pitch).astype(int)
-        j = ((whole.v - self.box.v0) / self.pitch).astype(int)
+        u, v, z = whole.plan.uvz
+        i = ((u - self.box.u0) / self.pitch).astype(int)
+        j = ((v - self.box.v0) / self.pitch).astype(int)
         rows, columns = max(int(i.max()), 0) + 1, max(int(j.max()), 0) + 1
         cell = i.clip(0) * columns + j.clip(0)
-        order = np.lexsort((whole.z, cell))
+        order = np.lexsort((z, cell))
         first = np.flatnonzero(np.diff(cell[order], prepend=-1))
         last = np.append(first[1:], len(order))
         self.z = np.full((rows, columns), np.nan)
-        self.z.ravel()[cell[order[first]]] = whole.z[order[(first + last - 1) // 2]]
+        self.z.ravel()[cell[order[first]]] = z[order[(first + last - 1) // 2]]
 
     def select_box(self, box: Box) -> tuple[np.ndarray, tuple[int, int]]:
         """Return the heights in a box, and their first row and column."""

@@ -1,6 +1,7 @@
 """Lay out the plan of one building.
 
-It has a frame of its own, the points that count, a grid of cells, and the unobserved cells.
+It has a frame of its own and the points that count. Places where none may be seen are laid out as
+cells.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from ...geometry.point_in_polygon import flips
 from ...geometry.rings import ring_edges
 from ..direction import main_direction
 from ..walls import on_walls
-from .planes import Cloud, Grid, UnobservedCells
+from .planes import Cloud
 
 # With fewer points, a building is one level block at their median, and a window shows nothing.
 MIN_STRUCTURE_POINTS = 4
@@ -34,26 +35,23 @@ COVERED_SHARE = 0.8  # Share of the outline that points usually cover.
 MERGE_LINES_M = 0.2  # Lines of the grid that are nearer (m) are one.
 GRID_CELL_M = 0.5  # Size (m) of a cell.
 GRID_CELL_SPACINGS = 0.6  # Size of a cell in spacings of points, where these are larger.
-MAX_CELLS = 22  # Most cells a side.
 HEIGHT_MARGIN_M = 0.3  # Distance (m) beyond the range of heights that an unobserved roof may have.
 SHADE = 0.2  # Price (points) of the highest of roofs for each missing point.
 
 
 @dataclass(frozen=True)
 class Plan:
-    """Everything that the search needs of one building.
+    """The points of one building in its own axes.
 
-    `density` is in points per square metre of covered outline. `border` (3, m) are u, v, z of
-    points next to the outline that do not count: they may be of the walls. `points` (n, 3) are all
-    inside the outline, in the frame of the building.
+    `uvz` (3, n) count and ascend by u. Those next to the outline in `border` (3, m) do not: they
+    may be of the walls. `density` is in points per square metre of covered outline. `points` (n, 3)
+    are all inside the outline, in the frame of the building.
     """
 
     frame: PlanFrame
-    cloud: Cloud
-    grid: Grid
-    unobserved: UnobservedCells
-    density: float
+    uvz: np.ndarray
     border: np.ndarray
+    density: float
     points: np.ndarray
 
 
@@ -79,7 +77,7 @@ def measure_depth(x, y, starts, ends):
 
 
 def lay_lines(
-    lowest: float, highest: float, vertices: np.ndarray, cell: float, most_cells: int = MAX_CELLS
+    lowest: float, highest: float, vertices: np.ndarray, cell: float, most_cells: int
 ) -> np.ndarray:
     """Lay at most `most_cells` cells' lines from `lowest` to `highest`.
 
@@ -119,7 +117,7 @@ def find_cells(lines: np.ndarray, x: np.ndarray) -> np.ndarray:
 
 
 def lay_out_plan(points_local: np.ndarray, outline: shapely.Polygon) -> Plan:
-    """Lay out frame, points, grid and unobserved cells for `points_local` (n, 3).
+    """Lay out the frame and the points of `points_local` (n, 3).
 
     Points outside `outline` do not count.
     """
@@ -135,20 +133,10 @@ def lay_out_plan(points_local: np.ndarray, outline: shapely.Polygon) -> Plan:
     middle = len(inside) // 2
     height = np.partition(inside[:, 2], middle)[middle] if len(inside) else 0.0
     frame = PlanFrame(np.array([*centroid, height]), rotation)
-    uvz = frame.to_plan(inside)
-    uvz = uvz[np.lexsort(np.round(uvz.T, 6))]  # independent of the points' order
-    density = len(uvz) / max(COVERED_SHARE * outline.area, 1.0)
-    corners = (shapely.get_coordinates(outline.exterior)[:-1] - centroid) @ rotation.T
-    cell = max(GRID_CELL_M, GRID_CELL_SPACINGS / math.sqrt(max(density, 1e-9)))
-    (low_u, low_v), (high_u, high_v) = corners.min(axis=0), corners.max(axis=0)
-    u_lines = lay_lines(low_u, high_u, corners[:, 0], cell)
-    v_lines = lay_lines(low_v, high_v, corners[:, 1], cell)
-    grid = Grid(u_lines, v_lines)
-    u, v, z = (np.ascontiguousarray(column) for column in uvz.T)
-    cloud = Cloud(u, v, z, find_cells(u_lines, u), find_cells(v_lines, v))
-    border = frame.to_plan(all_points[~counts]).T
-    unobserved = lay_unobserved_cells(frame, grid, cloud, outline)
-    return Plan(frame, cloud, grid, unobserved, density, border, all_points)
+    uvz = frame.to_plan(inside).T
+    uvz = uvz[:, np.lexsort(np.round(uvz[::-1], 6))]  # independent of the points' order
+    density = len(inside) / max(COVERED_SHARE * outline.area, 1.0)
+    return Plan(frame, uvz, frame.to_plan(all_points[~counts]).T, density, all_points)
 
 
 def find_roof_points(points: np.ndarray, depth: np.ndarray, area_m2: float) -> np.ndarray:
@@ -184,21 +172,12 @@ def measure_emptiness(cloud: Cloud, expected: np.ndarray) -> np.ndarray:
     return np.clip(1.0 - sums[0] / np.maximum(0.5 * sums[1], 1e-9), 0.0, 1.0)
 
 
-def lay_unobserved_cells(
-    frame: PlanFrame, grid: Grid, cloud: Cloud, outline: shapely.Polygon
-) -> UnobservedCells:
-    """Lay a cell's centre inside the outline in every cell of the grid.
+def lay_cells(cloud: Cloud, u_lines: np.ndarray, v_lines: np.ndarray, density: float) -> np.ndarray:
+    """Return u, v, weight and shade (4, g) of the middle of every cell between lines.
 
-    It weighs as many points as its area usually holds.
+    A cell weighs as many points as its area usually holds, at a `density` of points (n / m2).
     """
-    centre_u, centre_v = (0.5 * (lines[:-1] + lines[1:]) for lines in (grid.u, grid.v))
-    u, v = np.repeat(centre_u, len(centre_v)), np.tile(centre_v, len(centre_u))
-    xy = frame.xy_local(np.column_stack([u, v]))
-    inside = measure_depth(xy[:, 0].copy(), xy[:, 1].copy(), *ring_edges(outline)) > 0.0
-    weight = np.outer(np.diff(grid.u), np.diff(grid.v)) * len(cloud.u) / outline.area
+    centres = np.meshgrid(*(0.5 * (x[:-1] + x[1:]) for x in (u_lines, v_lines)), indexing="ij")
+    weight = np.outer(np.diff(u_lines), np.diff(v_lines)) * density
     shade = SHADE * weight * measure_emptiness(cloud, weight)
-    z_low, z_high = (cloud.z.min(), cloud.z.max()) if len(cloud.z) else (0.0, 0.0)
-    u, v, weight, shade = (
-        np.ascontiguousarray(column[inside]) for column in (u, v, weight.ravel(), shade.ravel())
-    )
-    return UnobservedCells(u, v, weight, shade, z_low - HEIGHT_MARGIN_M, z_high + HEIGHT_MARGIN_M)
+    return np.array([*centres, weight, shade]).reshape(4, -1)

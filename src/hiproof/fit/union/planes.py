@@ -30,8 +30,6 @@ TEMPLATE_POINTS = 150  # Points that templates are fitted to: few are enough for
 
 Cloud = namedtuple("Cloud", "u v z i j")  # Points (n,) and the grid cell of each.
 Grid = namedtuple("Grid", "u v")  # Grid lines, ascending.
-# Centres of cells inside the outline, and the heights that a roof may have.
-UnobservedCells = namedtuple("UnobservedCells", "u v weight shade low high")
 
 
 @compiled

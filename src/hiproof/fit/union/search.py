@@ -7,20 +7,15 @@ over moves makes one roof of what meets along the cuts.
 from __future__ import annotations
 
 import numpy as np
-import shapely
 
-from ..prices import compute_unit
-from .allowed import list_allowed_shapes
 from .blocks import BLOCK_M2, HeightRaster, find_cheapest_cut
 from .grow import grow
 from .moves import refit_volumes
 from .objective import compute_objective, is_base_visible
-from .plan import Plan
-from .scene import find_directions, make_scene
+from .scene import end_at_border, open_window, turn_to_directions
 from .trim import trim
 from .volumes import U0, V1, make_base
 from .whole import Box, Whole, clip_to_box
-from .window import end_at_border, open_window
 
 # Points of a block in which structure is searched, a square metre and at least.
 SEARCH_DENSITY, LEAST_SEARCH_POINTS = 2.7, 600
@@ -29,24 +24,13 @@ FULL_POINTS = 3000
 LEAST_HALF_M2 = 1.0  # Least area (m2) of outline on either side of a cut.
 
 
-def lay_out_whole(
-    plan: Plan, outline: shapely.Polygon, settings, types: tuple[str, ...] = ()
-) -> Whole:
-    """Return the scene of all points with what is searched block by block.
-
-    `settings` are those of [compound]. Volumes have only shapes that parts of `types` need, any
-    without types.
-    """
-    unit = compute_unit(plan.density, settings)
-    angles, allowed = find_directions(outline, plan), list_allowed_shapes(types)
-    scene = make_scene(plan, outline, angles, unit, settings.tolerance_m, allowed)
-    return Whole(scene, plan, outline)
-
-
 def find_volumes(whole: Whole) -> np.ndarray:
     """Find the volumes (k, COLUMNS) of a roof."""
-    blocks = search_box(whole, HeightRaster(whole), whole.box, whole.area)
-    return np.concatenate(blocks or [make_base(float(np.sort(whole.z)[(len(whole.z) - 1) // 2]))])
+    blocks = search_box(whole, HeightRaster(whole), whole.box, whole.outline.area)
+    if blocks:
+        return np.concatenate(blocks)
+    z = np.sort(whole.plan.uvz[2])  # of hardly a point
+    return make_base(float(z[(len(z) - 1) // 2]))
 
 
 def count_search_points(area_m2: float) -> int:
@@ -75,9 +59,9 @@ def find_step(whole: Whole, box: Box, axis: int, place: float, pitch: float) -> 
     """
     strip = box.split(axis, place + 2 * pitch)[0].split(axis, place - 2 * pitch)[1]
     numbers = whole.find_points(strip)
-    x = (whole.u, whole.v)[axis][numbers]
+    x, z = whole.plan.uvz[[axis, 2]][:, numbers]
     order = np.argsort(x, kind="stable")
-    x, z = x[order], whole.z[numbers[order]]
+    x, z = x[order], z[order]
     if len(x) < 2:
         return place
     before = np.arange(1, len(x))
@@ -100,7 +84,8 @@ def search_block(whole: Whole, box: Box, area_m2: float) -> list[np.ndarray]:
         return []
     volumes, _ = grow(scene)
     volumes, value = refit_volumes(volumes, full, compute_objective(volumes, full))
-    volumes, _ = trim(volumes, full, value)
+    nodes = turn_to_directions(whole, *whole.raster.cut(*box).list_nodes())
+    volumes, _ = trim(volumes, full, value, *nodes)
     is_alone = box == whole.box
     if not is_base_visible(volumes, full, count_points=not is_alone):
         volumes = volumes[1:]

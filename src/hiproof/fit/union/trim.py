@@ -11,7 +11,7 @@ import numpy as np
 from ..prices import SLACK_UNITS
 from .moves import remove_volume
 from .objective import compute_objective
-from .scene import Scene, list_nodes
+from .scene import Scene
 from .volumes import (
     DIRECTION,
     U0,
@@ -28,13 +28,15 @@ NEAR_VERTEX_M = 0.3  # A corner within this distance (m) of what is visible is t
 OUTWARDS = np.array([-1.0, 1.0])
 
 
-def trim(volumes: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray, float]:
+def trim(
+    volumes: np.ndarray, scene: Scene, value: float, U: np.ndarray, V: np.ndarray
+) -> tuple[np.ndarray, float]:
     """Drop volumes that are not visible, and draw hidden edges in.
 
-    Edges are drawn in to what is visible of each volume. Also returns the objective.
+    Edges are drawn in to what is visible of each volume at the nodes U, V (directions, n). Also
+    returns the objective.
     """
     volumes, value = draw_out(volumes, scene, value)
-    U, V = list_nodes(scene)
     _, top = compute_roof_heights(volumes, U, V)
     k = 1
     for number in range(1, len(volumes)):

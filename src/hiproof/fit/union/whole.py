@@ -1,14 +1,21 @@
-"""Hold the points of a large roof, sorted so that a window on it costs what the window holds."""
+"""Hold a building as it is searched: block by block, so that a block costs what it holds."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 import shapely
 
+from ..prices import compute_unit
+from .allowed import list_allowed_shapes
+from .depth import DepthRaster, make_depth_raster
+from .directions import find_directions
 from .plan import Plan
-from .scene import Scene
+
+DEAD_M = 0.03  # Residual (m) that costs nothing in the search.
+LEAST_RAMP_M = 0.02  # Least difference (m) over which larger residuals grow to the cost of a point.
 
 
 class Box(NamedTuple):
@@ -31,24 +38,50 @@ def clip_to_box(geometry: shapely.Geometry, box: Box) -> shapely.Geometry:
     return shapely.clip_by_rect(geometry, box.u0, box.v0, box.u1, box.v1)
 
 
+@dataclass(frozen=True)
 class Whole:
-    """The points and the outline of a building. A large one is searched block by block.
+    """A building in the plan's axes.
 
-    `scene` is that of all points. `u`, `v`, `z` (n,) are the points, ascending by u, and `outline`
-    is in the plan's axes.
+    Volumes may follow directions, of which `turn` (d, 2) are cosine and sine, and have the
+    `allowed` shapes, see `volumes.is_allowed`. A point counts as unexplained `width` metres beyond
+    DEAD_M. A unit of structure must explain `unit` points.
     """
 
-    def __init__(self, scene: Scene, plan: Plan, outline: shapely.Polygon):
-        self.scene, self.plan = scene, plan
-        order = scene.order[0, 0]
-        order = order[order < scene.n]
-        self.u, self.v, self.z = scene.U[0][order], scene.V[0][order], scene.z[order]
-        self.outline = shapely.transform(outline, plan.frame.uv_plan)
+    plan: Plan
+    outline: shapely.Polygon
+    raster: DepthRaster
+    turn: np.ndarray
+    allowed: np.ndarray
+    width: float
+    unit: float
+
+    @property
+    def box(self) -> Box:
         u0, v0, u1, v1 = self.outline.bounds
-        self.box, self.area = Box(u0, u1, v0, v1), outline.area
+        return Box(u0, u1, v0, v1)
 
     def find_points(self, box: Box) -> np.ndarray:
-        """Return the numbers (m,) of the points in a box, among those sorted by u."""
-        first, last = np.searchsorted(self.u, box.u0), np.searchsorted(self.u, box.u1, side="right")
-        v = self.v[first:last]
-        return first + np.flatnonzero((v >= box.v0) & (v <= box.v1))
+        """Return the numbers (m,) of the points in a box."""
+        u, v, _ = self.plan.uvz
+        first, last = np.searchsorted(u, box.u0), np.searchsorted(u, box.u1, side="right")
+        return first + np.flatnonzero((v[first:last] >= box.v0) & (v[first:last] <= box.v1))
+
+
+def lay_out_whole(
+    plan: Plan, outline: shapely.Polygon, settings, types: tuple[str, ...] = ()
+) -> Whole:
+    """Lay out a building for the search. `settings` are those of [compound].
+
+    Volumes have only shapes that parts of `types` need, any without types.
+    """
+    uv_outline = shapely.transform(outline, plan.frame.uv_plan)
+    angles = np.array(find_directions(outline, plan.frame))
+    return Whole(
+        plan,
+        uv_outline,
+        make_depth_raster(uv_outline),
+        np.column_stack([np.cos(angles), np.sin(angles)]),
+        list_allowed_shapes(types),
+        max(settings.tolerance_m - DEAD_M, LEAST_RAMP_M),
+        compute_unit(plan.density, settings),
+    )
