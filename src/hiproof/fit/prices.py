@@ -76,6 +76,8 @@ SLACK_UNITS = 0.02  # drawing a hidden edge in: what is hidden explains nothing
 # How far above the best a change may begin and still become the best, in units.
 
 BEGIN_UNITS, BEGIN_SHARE = 2.0, 0.01  # a move of one volume; besides, a share of the points
+NEW_UNITS, NEW_MOVED_UNITS = 6.0, 1.0
+"""A new volume, and one whose edges were moved once."""
 
 # How much the points of a place must cost for a volume to be looked for.
 

@@ -9,13 +9,16 @@ import numpy as np
 from ...compiled import compiled
 from ..prices import (
     FREELY_UNITS,
+    NEW_MOVED_UNITS,
+    NEW_UNITS,
     ROOF_UNITS,
 )
 from .around import measure_context
 from .candidates import SAME_SLOPE, find_best_rectangles
+from .edges import NO_GAIN, move_edges
 from .improve import improve
-from .moves import settle_move
-from .objective import compute_costs
+from .objective import compute_costs, compute_objective_with
+from .refit import refit
 from .volumes import (
     DIRECTION,
     LEAN0,
@@ -109,8 +112,9 @@ def find_best_addition(volumes, value, ground, candidates):
             surcharge = FREELY_UNITS * scene.unit if has_free_plane(new, scene) else 0.0
             if replacing and len(volumes) > 1:
                 new[REPLACES] = 1.0
-            limit = min(value, lowest) - surcharge
-            trial, trial_value = settle_move(extended.copy(), scene, len(volumes), limit, context)
+            trial, trial_value = settle_new(
+                extended.copy(), scene, min(value, lowest) - surcharge, context
+            )
             if trial_value < np.inf:
                 best, lowest = trial, trial_value
             if replacing:
@@ -155,8 +159,7 @@ def cut_back_neighbours(volumes, extended, scene, best, lowest, value, surcharge
                 cut = extended.copy()
                 cut[j, U0 + edge] = stop
                 context = measure_context(cut, scene.U, scene.V, last)
-                limit = min(value, lowest) - surcharge
-                trial, trial_value = settle_move(cut, scene, last, limit, context)
+                trial, trial_value = settle_new(cut, scene, min(value, lowest) - surcharge, context)
                 if trial_value < np.inf:
                     best, lowest = trial, trial_value
     return best, lowest
@@ -167,3 +170,20 @@ def has_overlap(row, other):
     """Return whether two rectangles have more than a strip in common."""
     u = min(row[U1], other[U1]) - max(row[U0], other[U0])
     return min(u, min(row[V1], other[V1]) - max(row[V0], other[V0])) > CUT_LEAST_M
+
+
+@compiled
+def settle_new(volumes, scene, value, context):
+    """Fit the last volume, which is new, and move its edges, twice.
+
+    Returns the volumes and their objective, which is infinite if it is not below `value`. A volume
+    that begins too far above `value` is given up.
+    """
+    k, trial_value = len(volumes) - 1, np.inf
+    for units in NEW_UNITS, NEW_MOVED_UNITS:
+        refit(volumes, scene, k, context)
+        trial_value = compute_objective_with(volumes, scene, k, context)
+        if trial_value > value + units * scene.unit:
+            return volumes, np.inf
+        trial_value = move_edges(volumes, scene, k, trial_value, context)
+    return volumes, trial_value if trial_value < value - NO_GAIN else np.inf
