@@ -1,13 +1,13 @@
 """Generate scenes and volumes for the laws of the union's search."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import shapely
 
-from hiproof.fit.union.allowed import list_allowed_shapes
 from hiproof.fit.union.plan import lay_out_plan
-from hiproof.fit.union.scene import make_scene
+from hiproof.fit.union.scene import open_window
 from hiproof.fit.union.volumes import (
     COLUMNS,
     DIRECTION,
@@ -26,7 +26,9 @@ from hiproof.fit.union.volumes import (
     equalise_slopes,
     make_base,
 )
+from hiproof.fit.union.whole import lay_out_whole
 from hiproof.primitives.family import GENERAL_SHAPES, Member
+from hiproof.settings import Settings
 
 OUTLINES = (
     shapely.box(-6.0, -4.0, 6.0, 4.0),
@@ -88,15 +90,27 @@ def compute_heights(volumes, U, V):
     return z, top
 
 
+def lay_out_scene(points, outline, angles, types=()):
+    """Return a building in directions at `angles` (rad), and the scene of all its points.
+
+    A unit is three points, and a point 0.25 m off the roof is unexplained.
+    """
+    plan = lay_out_plan(points, outline)
+    turn = np.column_stack([np.cos(angles), np.sin(angles)])
+    whole = lay_out_whole(plan, outline, Settings().compound, types)
+    whole = replace(whole, turn=turn, unit=3.0, width=0.22)
+    return whole, open_window(whole, whole.box, len(points))
+
+
 def draw_scene(rng, volumes=None, count=250, types=()):
     """Draw points near the roof of `volumes`, or level ground, a tenth of them astray."""
     outline = OUTLINES[rng.integers(len(OUTLINES))]
     x0, y0, x1, y1 = outline.bounds
     xy = rng.uniform((x0, y0), (x1, y1), (2 * count, 2))
     xy = xy[shapely.contains_xy(outline, *xy.T)][:count]
-    plan = lay_out_plan(np.column_stack([xy, np.zeros(len(xy))]), outline)
     angles = [0.0, math.radians(rng.uniform(15.0, 75.0))]
-    scene = make_scene(plan, outline, angles, 3.0, 0.25, list_allowed_shapes(types))
+    points = np.column_stack([xy, np.zeros(len(xy))])
+    _, scene = lay_out_scene(points, outline, angles, types)
     z = (
         compute_heights(volumes, scene.U, scene.V)[0]
         if volumes is not None

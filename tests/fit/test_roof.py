@@ -30,7 +30,8 @@ from hiproof.fit.roof.tables import (
     place_volume,
 )
 from hiproof.fit.union.plan import lay_out_plan
-from hiproof.fit.union.search import find_volumes, lay_out_whole
+from hiproof.fit.union.search import find_volumes
+from hiproof.fit.union.whole import lay_out_whole
 from hiproof.model import ROOF, Roof
 from hiproof.settings import Settings
 from hiproof.simulate import COMPOUND_KINDS, ScanSettings, random_compound, scan
@@ -52,11 +53,11 @@ def begin_roof(kind, seed=0):
     settings = Settings().compound
     plan = lay_out_plan(points, outline)
     whole = lay_out_whole(plan, outline, settings)
-    site = make_site(whole.scene, whole.outline, plan.border)
-    volumes = find_volumes(whole, settings)
-    roof = start_roof(volumes, whole.scene.turn, site)
+    site = make_site(whole)
+    volumes = find_volumes(whole)
+    roof = start_roof(volumes, whole.turn, site)
     fit_roof(roof, site, 2)
-    return roof, site, whole.outline, (volumes, whole.scene.turn, site)
+    return roof, site, whole.outline, (volumes, whole.turn, site)
 
 
 def improve_all(roof, site):

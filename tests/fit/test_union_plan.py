@@ -13,9 +13,6 @@ from hiproof.fit.roof.start import start_roof
 from hiproof.fit.shapes.curved import fit_shapes
 from hiproof.fit.shapes.regions import unite_outlines
 from hiproof.fit.shapes.teeth import unite_saw_teeth
-from hiproof.fit.union.allowed import list_allowed_shapes
-from hiproof.fit.union.plan import lay_out_plan
-from hiproof.fit.union.scene import make_scene
 from hiproof.fit.union.volumes import (
     U0,
     U1,
@@ -27,23 +24,7 @@ from hiproof.model import Part, Piece
 from hiproof.primitives import get
 from hiproof.primitives.family import Member
 from hiproof.settings import Settings
-from union_scenes import list_corners
-
-
-def lay_out_scene(rng, outline, volumes=None):
-    """Return plan and scene (one direction) of points at random over `outline`.
-
-    The points are on the roof of `volumes`, if these are given.
-    """
-    x0, y0, x1, y1 = outline.bounds
-    xy = rng.uniform((x0, y0), (x1, y1), (400, 2))
-    xy = xy[shapely.contains_xy(outline, *xy.T)]
-    plan = lay_out_plan(np.column_stack([xy, np.zeros(len(xy))]), outline)
-    scene = make_scene(plan, outline, [0.0], 3.0, 0.25, list_allowed_shapes(()))
-    if volumes is not None:
-        scene = scene._replace(z=compute_roof_heights(volumes, scene.U, scene.V)[0])
-    return plan, scene
-
+from union_scenes import lay_out_scene, list_corners
 
 # --- sides ----------------------------------------------------------------------------------------
 
@@ -62,11 +43,15 @@ def test_a_side_lies_on_a_wall_near_it_unless_points_lie_elsewhere(end, drawn_en
     outline = block | shapely.box(4.0, -4.0, 7.0, 0.0) | shapely.box(-7.0, 0.0, -4.0, 4.0)
     volumes = np.vstack([make_base(-5.0), make_base(2.0)])
     volumes[1, U0 : V1 + 1] = -4.0, end, -4.0, 4.0
-    plan, scene = lay_out_scene(np.random.default_rng(0), outline, volumes)
-    scene = scene._replace(unit=3.0)
-    site = make_site(scene, shapely.transform(outline, plan.frame.uv_plan), np.zeros((3, 0)))
+    xy = np.random.default_rng(0).uniform(-7.0, 7.0, (600, 2))
+    xy = xy[shapely.contains_xy(outline, *xy.T)]
+    whole, _ = lay_out_scene(np.column_stack([xy, np.zeros(len(xy))]), outline, [0.0])
+    z = compute_roof_heights(volumes, *whole.plan.uvz[:2, None])[0]
+    site = make_site(
+        replace(whole, plan=replace(whole.plan, uvz=np.vstack([whole.plan.uvz[:2], z])))
+    )
     volumes[1, U1] = drawn_end
-    roof = start_roof(volumes, scene.turn, site)
+    roof = start_roof(volumes, whole.turn, site)
     ends = -roof.half_planes[1, :2, 2] * roof.half_planes[1, :2, 0]
     assert ends == pytest.approx([-4.0, place], abs=1e-9)
 

@@ -44,7 +44,6 @@ from hiproof.fit.union.objective import (
     compute_objective_with,
 )
 from hiproof.fit.union.refit import refit
-from hiproof.fit.union.scene import list_nodes
 from hiproof.fit.union.trim import (
     NEAR_VERTEX_M,
     draw_in,
@@ -279,15 +278,12 @@ def test_shapes_that_are_not_allowed_cost_infinitely_much():
 
 @pytest.mark.parametrize("seed", range(40))
 def test_moving_edges_keeps_the_books_and_never_costs(seed):
-    rng, volumes, scene = draw_case(seed)
+    _, volumes, scene = draw_case(seed)
     value = compute_objective(volumes, scene)
     for k in range(1, len(volumes)):
         original, remainder = value, np.delete(volumes, k, axis=0)
-        reach, context = (
-            rng.choice([0.5, 2.0, 60.0]),
-            measure_context(volumes, scene.U, scene.V, k),
-        )
-        value = move_edges(volumes, scene, k, value, reach, context)
+        context = measure_context(volumes, scene.U, scene.V, k)
+        value = move_edges(volumes, scene, k, value, context)
         assert value <= original + 1e-9
         assert is_true(volumes, scene, value)
         assert (np.delete(volumes, k, axis=0) == remainder).all()
@@ -300,7 +296,7 @@ def test_moved_edges_leave_a_rectangle(seed):
     for k in range(1, len(volumes)):
         original = volumes[k].copy()
         context = measure_context(volumes, scene.U, scene.V, k)
-        move_edges(volumes, scene, k, value, 60.0, context)
+        move_edges(volumes, scene, k, value, context)
         for lower in (U0, U0 + 2):
             moved = (volumes[k, lower : lower + 2] != original[lower : lower + 2]).any()
             assert not moved or volumes[k, lower + 1] > volumes[k, lower]
@@ -322,10 +318,15 @@ def test_a_move_gives_the_true_objective_and_never_a_higher_one(move, seed):
     assert is_true(moved, scene, result)
 
 
+def list_cells(scene):
+    """Return the unobserved cells of a scene: U, V (directions, g)."""
+    return scene.U[:, scene.n :], scene.V[:, scene.n :]
+
+
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_hidden_edge_is_drawn_in_where_no_height_changes(seed):
     rng, volumes, scene = draw_case(seed)
-    value, (U, V) = compute_objective(volumes, scene), list_nodes(scene)
+    value, (U, V) = compute_objective(volumes, scene), list_cells(scene)
     for k in range(1, len(volumes)):
         for edge in (U0, U0 + 1, U0 + 2, V1):
             seen_to = rng.uniform(
@@ -368,7 +369,9 @@ def test_a_rectangle_just_short_of_the_outline_is_drawn_out_to_it():
 @pytest.mark.parametrize("seed", SEEDS)
 def test_trimming_gives_the_true_objective_and_no_volume_reaches_further_than_before(seed):
     _, volumes, scene = draw_case(seed)
-    trimmed, result = trim(volumes.copy(), scene, compute_objective(volumes, scene))
+    trimmed, result = trim(
+        volumes.copy(), scene, compute_objective(volumes, scene), *list_cells(scene)
+    )
     assert is_true(trimmed, scene, result)
     planes = {tuple(row[OFFSET0 : OFFSET0 + N_PLANES]): row for row in volumes}
     for row in trimmed:
@@ -384,13 +387,13 @@ def test_a_volume_that_shows_at_one_line_of_nodes_keeps_its_width(seed):
     Drawn in to it they would leave a line.
     """
     scene = draw_scene(np.random.default_rng(seed))
-    _, V = list_nodes(scene)
+    _, V = list_cells(scene)
     line = float(np.sort(V[0])[V.shape[1] // 2])
     lower, upper = make_level(-8.0, line - 0.05, 3.0), make_level(line + 0.01, 8.0, 3.0)
     middle = make_level(line - 1.0, line + 1.0, 2.0)
     volumes = np.vstack([make_base(-50.0), middle, lower, upper])
     scene = scene._replace(z=compute_heights(volumes, scene.U, scene.V)[0])
-    result, _ = trim(volumes, scene, compute_objective(volumes, scene))
+    result, _ = trim(volumes, scene, compute_objective(volumes, scene), *list_cells(scene))
     assert (result[:, U0] < result[:, U0 + 1]).all()
     assert (result[:, V0] < result[:, V1]).all()
 

@@ -7,13 +7,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hiproof.fit.roof import fit_building
-from hiproof.fit.union.allowed import list_allowed_shapes
 from hiproof.fit.union.candidates import list_candidates
 from hiproof.fit.union.grow import prepare_growth, regrow_volumes
 from hiproof.fit.union.objective import compute_objective
-from hiproof.fit.union.plan import lay_out_plan, measure_emptiness
+from hiproof.fit.union.plan import measure_emptiness
 from hiproof.fit.union.planes import Cloud
-from hiproof.fit.union.scene import find_directions, make_scene
 from hiproof.model import Roof
 from points_of_roofs import scatter
 from roof_zoo import FRAME
@@ -21,15 +19,6 @@ from union_scenes import draw_scene, draw_volumes
 
 L_SHAPE = shapely.Polygon([(0, 0), (14, 0), (14, 7), (7, 7), (7, 15), (0, 15)])
 U_SHAPE = shapely.Polygon([(0, 0), (20, 0), (20, 14), (14, 14), (14, 6), (6, 6), (6, 14), (0, 14)])
-
-
-def make_scene_over(outline, density=4.0):
-    """Return the scene of level points scattered over `outline`."""
-    xy = scatter(outline, np.random.default_rng(0), density)
-    plan = lay_out_plan(np.column_stack([xy, np.zeros(len(xy))]), outline)
-    return plan, make_scene(
-        plan, outline, find_directions(outline, plan), 1.0, 0.25, list_allowed_shapes(())
-    )
 
 
 def test_two_hips_that_share_a_corner_are_two_hips():

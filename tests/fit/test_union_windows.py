@@ -7,11 +7,10 @@ import shapely
 from hiproof import reconstruct
 from hiproof.compose import check_solid
 from hiproof.fit.roof import fit_building
-from hiproof.fit.union.allowed import list_allowed_shapes
 from hiproof.fit.union.blocks import BLOCK_M2, HeightRaster, find_cheapest_cut
 from hiproof.fit.union.plan import lay_out_plan
-from hiproof.fit.union.scene import find_directions, make_scene
-from hiproof.fit.union.whole import Whole
+from hiproof.fit.union.whole import lay_out_whole
+from hiproof.settings import Settings
 from hiproof.status import Status
 from points_of_roofs import sample_heights
 
@@ -36,10 +35,7 @@ def measure_heights(fit, xy):
 
 def make_whole(height, outline, density=5.0):
     plan = lay_out_plan(sample_heights(height, outline, density, 0.02), outline)
-    scene = make_scene(
-        plan, outline, find_directions(outline, plan), 2.0, 0.2, list_allowed_shapes(())
-    )
-    return Whole(scene, plan, outline)
+    return lay_out_whole(plan, outline, Settings().compound)
 
 
 def test_boxes_on_a_large_level_roof_are_found():
@@ -103,7 +99,7 @@ def test_a_cut_falls_on_a_step_and_blocks_are_small():
     raster = HeightRaster(whole)
     axis, positions = find_cheapest_cut(raster, whole.box)
     step = whole.plan.frame.to_plan(np.array([[8.0, 7.5, 6.0]]))[0]
-    assert whole.area > BLOCK_M2
+    assert outline.area > BLOCK_M2
     assert positions == pytest.approx(step[axis], abs=2 * raster.pitch)
 
 

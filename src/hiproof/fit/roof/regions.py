@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import permutations
 from typing import NamedTuple
 
 import numpy as np
@@ -43,6 +44,7 @@ def list_places(roof: Tables, drawing: Drawing, outline: shapely.Polygon) -> lis
     planes = [list(range(count)) for count in roof.n_planes[: len(regions)].tolist()]
     if len(regions) == 1:
         return [Place(0, regions[0], planes[0], len(regions[0]) > 1)]
+    join_pieces(roof, drawing, regions, planes)
     ended = end_at_others(roof, drawing, regions, planes)
     visible: dict[int, shapely.Geometry] = {}
     groups: dict[tuple, dict[int, list[int]]] = {}
@@ -83,22 +85,17 @@ def end_at_others(
 ) -> set[int]:
     """End volumes where a plane begins that is hidden, or that another volume shows as its own.
 
-    A wing that ends in a roof may have that roof's plane as its end, but is a gable. What a volume
-    shows of another is a piece of that one. Changes the `regions` and `planes` of volumes and the
-    owners of fragments, and returns which volumes end so.
+    A wing that ends in a roof may have that roof's plane as its end, but is a gable. Changes the
+    `regions` and `planes` of volumes and the owners of fragments, and returns which volumes end so.
     """
     ended, owners = set(), drawing.owners[: drawing.count[0]]
     for k in range(len(regions)):
         for p in reversed(planes[k]):
-            same = np.argwhere(drawing.numbers[: len(regions)] == drawing.numbers[k, p])
-            others = [(j, q) for j, q in same.tolist() if j != k and q in planes[j]]
-            for j in find_pieces(roof, k, p, regions, planes, others):
-                regions[k] = list_polygons(unite([*regions[k], *regions[j]]))
-                owners[owners[:, 0] == j] = k, p
-                others, planes[j] = [other for other in others if other[0] != j], []
             if len(planes[k]) == 1:
                 break
             seen = np.flatnonzero((owners == (k, p)).all(axis=1))
+            same = np.argwhere(drawing.numbers[: len(regions)] == drawing.numbers[k, p])
+            others = [(j, q) for j, q in same.tolist() if j != k and q in planes[j]]
             if len(seen) and (taker := find_taker(roof, k, p, regions, planes, others)):
                 j, wide = taker
                 regions[j] = list_polygons(wide)
@@ -124,25 +121,30 @@ def end_at_others(
     return ended
 
 
-def find_pieces(
+def join_pieces(
     roof: Tables,
-    k: int,
-    p: int,
+    drawing: Drawing,
     regions: list[list[shapely.Polygon]],
     planes: list[list[int]],
-    others: list[tuple[int, int]],
-) -> list[int]:
-    """Return the volumes of plane p alone that lie where volume k would show that plane.
+) -> None:
+    """Make volumes that show planes of another, where it would show them, pieces of that one.
 
     A volume that replaces others uncovers such pieces, as between dormers that are drawn as one.
+    Changes the `regions` and `planes` of volumes and the owners of fragments.
     """
-    rest = np.delete(roof.planes[k, : roof.n_planes[k]], p, axis=0) - roof.planes[k, p]
-    place = draw_convex(np.concatenate([roof.half_planes[k], rest]))
-    return [
-        j
-        for j, q in others
-        if planes[j] == [q] and subtract(unite(regions[j]), place).area <= FRAGMENT_M2
-    ]
+    owners = drawing.owners[: drawing.count[0]]
+    for k, j in permutations(range(len(regions)), 2):
+        number = {int(drawing.numbers[k, p]): p for p in planes[k]}
+        twins = [number.get(int(drawing.numbers[j, q]), -1) for q in planes[j]]
+        if not twins or min(twins) < 0:
+            continue
+        place = draw_convex(roof.half_planes[k])
+        shown = unite([area for p in twins for area in draw_lowest(roof, k, p, regions[j])])
+        if subtract(unite(regions[j]), intersect(shown, place)).area <= FRAGMENT_M2:
+            regions[k] = list_polygons(unite([*regions[k], *regions[j]]))
+            for p, q in zip(twins, planes[j], strict=True):
+                owners[(owners == (j, q)).all(axis=1)] = k, p
+            planes[j] = []
 
 
 def find_taker(
