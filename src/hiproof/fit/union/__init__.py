@@ -4,9 +4,13 @@ Structure must be worth its price in points. The roof is
 
     z(x, y) = max over volumes whose rectangle contains (x, y)  of  min over its at most five planes
 
-plan        the building's frame, the points that count, a grid, the unobserved cells
+plan        the building's frame, the points that count, cells where none may be seen
+depth       how deep inside the outline places lie
+directions  in which volumes may lie
 allowed     the shapes that volumes may have
-scene       these in each of the building's directions, as the compiled search reads them
+whole       these together: a building as it is searched
+blocks      where a large one is cut
+scene       a block in each of the directions, as the compiled search reads it
 planes      compiled: planes and gables that explain rectangles of points
 candidates  volumes made of these planes, and where each would gain most
 volumes     compiled: a volume as a row of numbers, and the heights of a roof
@@ -19,10 +23,6 @@ facings     compiled: moves that turn its planes
 improve     compiled: all moves in turn
 add, grow   volumes added one by one to a level base, and the first of them grown anew
 trim        hidden edges drawn in
-search      these in order
-large       roofs of more than 200 m2, each block of which is searched as a house
-whole       what blocks need of a whole roof
-window      the scene of a box
-blocks      where a large roof is cut
+search      these in order, block by block
 fit         the outcome
 """
