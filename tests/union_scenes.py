@@ -97,8 +97,9 @@ def lay_out_scene(points, outline, angles, types=()):
     """
     plan = lay_out_plan(points, outline)
     turn = np.column_stack([np.cos(angles), np.sin(angles)])
-    whole = lay_out_whole(plan, outline, Settings().compound, types)
-    whole = replace(whole, turn=turn, unit=3.0, width=0.22)
+    compound = {"tolerance_m": 0.25, "evidence_points": 3.0}
+    settings = Settings.from_dict({"compound": compound}).compound
+    whole = replace(lay_out_whole(plan, outline, settings, types), turn=turn)
     return whole, open_window(whole, whole.box, len(points))
 
 

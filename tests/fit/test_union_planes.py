@@ -117,7 +117,7 @@ def test_depth_is_the_distance_to_the_border_negative_outside_and_in_holes():
 @pytest.mark.parametrize("vertices", [0, 3, 40, 500])
 def test_grid_lines_are_few_whatever_the_outline(vertices):
     positions = np.random.default_rng(0).uniform(0.0, 30.0, vertices)
-    lines = lay_lines(0.0, 30.0, positions, 0.5)
+    lines = lay_lines(0.0, 30.0, positions, 0.5, 22)
     assert len(lines) <= 29
     assert (np.diff(lines) > 0).all() and lines[0] == 0.0 and lines[-1] == 30.0
 

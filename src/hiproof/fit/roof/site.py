@@ -14,6 +14,8 @@ from ..union.whole import Whole
 from .draw import RING_CORNERS
 from .price import Site
 
+# Most cells a side where no point may be seen: with 40, rows of teeth end in wrong places.
+MOST_CELLS = 22
 SHORTEST_EDGE_M = 0.7  # Shortest edge (m) of an outline along whose line a volume may end.
 SHORTEST_CHORD_M = 1.5  # Shortest line (m) between two corners.
 CHORD_CORNERS = 16  # Most corners of an outline with such lines.
@@ -32,7 +34,7 @@ def make_site(whole: Whole, keeps_shapes: bool = False) -> Site:
     outline, points, border = whole.outline, whole.plan.uvz, whole.plan.border
     bays, heights, in_bay = list_bays(outline, np.hstack([points, border]).T)
     density, (low, high) = points.shape[1] / outline.area, np.sort(points[2])[[0, -1]]
-    grid = lay_grid(shapely.get_coordinates(outline), density)
+    grid = lay_grid(shapely.get_coordinates(outline), density, MOST_CELLS)
     cells = lay_unobserved_cells(whole, grid[0], grid[1], points, density)  # ascending by u
     points = np.hstack([points, border[:, in_bay[points.shape[1] :]]])
     points = points[:, np.argsort(points[0], kind="stable")]
@@ -56,7 +58,7 @@ def make_site(whole: Whole, keeps_shapes: bool = False) -> Site:
         high + HEIGHT_MARGIN_M,
         DEAD_M,
         whole.width,
-        whole.unit,
+        whole.compute_unit(),
         parts,
         sizes,
         boxes,

@@ -70,7 +70,7 @@ def open_window(whole: Whole, box: Box, most_points: int) -> Scene | None:
     u, v, z = uvz[:, np.argsort(uvz[2], kind="stable")[np.arange(n) * len(numbers) // n]]
     ring = shapely.get_coordinates(part)
     corners = np.array([ring @ np.array([[c, -s], [s, c]]) for c, s in whole.turn])
-    lines = [line for turned in corners for line in lay_grid(turned, n / part.area)]
+    lines = [line for turned in corners for line in lay_grid(turned, n / part.area, MOST_CELLS)]
     cells = lay_unobserved_cells(whole, lines[0], lines[1], np.array([u, v, z]), n / part.area)
     U, V = turn_to_directions(whole, np.r_[u, cells[0]], np.r_[v, cells[1]])
     return Scene(
@@ -87,17 +87,17 @@ def open_window(whole: Whole, box: Box, most_points: int) -> Scene | None:
         pad_rows(lines),
         list_vertices(corners),
         list_leans(corners),
-        whole.unit * n / len(numbers),
+        whole.compute_unit(n / len(numbers)),
         DEAD_M,
         whole.width,
         whole.allowed,
     )
 
 
-def lay_grid(corners: np.ndarray, density: float) -> list[np.ndarray]:
+def lay_grid(corners: np.ndarray, density: float, most_cells: int) -> list[np.ndarray]:
     """Lay lines along u and along v over a place with corners (c, 2), at a density (points/m2)."""
     cell = max(GRID_CELL_M, GRID_CELL_SPACINGS / math.sqrt(max(density, 1e-9)))
-    return [lay_lines(x.min(), x.max(), x, cell, MOST_CELLS) for x in corners.T]
+    return [lay_lines(x.min(), x.max(), x, cell, most_cells) for x in corners.T]
 
 
 def lay_unobserved_cells(

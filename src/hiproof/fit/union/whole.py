@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
@@ -40,11 +40,10 @@ def clip_to_box(geometry: shapely.Geometry, box: Box) -> shapely.Geometry:
 
 @dataclass(frozen=True)
 class Whole:
-    """A building in the plan's axes.
+    """A building in the plan's axes, with the settings of [compound].
 
     Volumes may follow directions, of which `turn` (d, 2) are cosine and sine, and have the
-    `allowed` shapes, see `volumes.is_allowed`. A point counts as unexplained `width` metres beyond
-    DEAD_M. A unit of structure must explain `unit` points.
+    `allowed` shapes, see `volumes.is_allowed`.
     """
 
     plan: Plan
@@ -52,8 +51,16 @@ class Whole:
     raster: DepthRaster
     turn: np.ndarray
     allowed: np.ndarray
-    width: float
-    unit: float
+    settings: Any
+
+    @property
+    def width(self) -> float:
+        """How far (m) beyond DEAD_M a point is unexplained."""
+        return max(self.settings.tolerance_m - DEAD_M, LEAST_RAMP_M)
+
+    def compute_unit(self, share: float = 1.0) -> float:
+        """Compute the points that a unit of structure must explain, of a share of all."""
+        return compute_unit(share * self.plan.density, self.settings)
 
     @property
     def box(self) -> Box:
@@ -82,6 +89,5 @@ def lay_out_whole(
         make_depth_raster(uv_outline),
         np.column_stack([np.cos(angles), np.sin(angles)]),
         list_allowed_shapes(types),
-        max(settings.tolerance_m - DEAD_M, LEAST_RAMP_M),
-        compute_unit(plan.density, settings),
+        settings,
     )
