@@ -248,12 +248,14 @@ def scan_cluttered_roof(seed):
 
 
 def test_volumes_are_added_to_a_large_roof_while_its_price_falls(monkeypatch):
-    """Else volumes that a roof fitted anew drops again are added without end."""
+    """Else volumes that a roof drops again are added without end."""
     prices, list_additions = [], add.list_additions
 
     def note_price(roof, site, scene, box):
+        # Steps are measured at places that depend on how edges are cut.
+        most = next((before for one, before in reversed(prices) if one is scene), np.inf)
         prices.append((scene, price(roof, site)))
-        assert len(prices) < 2 or prices[-2][0] is not scene or prices[-2][1] > prices[-1][1]
+        assert prices[-1][1] < most + 0.1 * site.unit
         return list_additions(roof, site, scene, box)
 
     monkeypatch.setattr(add, "list_additions", note_price)
