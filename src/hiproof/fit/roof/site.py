@@ -33,7 +33,7 @@ def make_site(whole: Whole, keeps_shapes: bool = False) -> Site:
     """
     outline, points, border = whole.outline, whole.plan.uvz, whole.plan.border
     bays, heights, in_bay = list_bays(outline, np.hstack([points, border]).T)
-    density, (low, high) = points.shape[1] / outline.area, np.sort(points[2])[[0, -1]]
+    density, low, high = points.shape[1] / outline.area, points[2].min(), points[2].max()
     grid = lay_grid(shapely.get_coordinates(outline), density, MOST_CELLS)
     cells = lay_unobserved_cells(whole, grid[0], grid[1], points, density)  # ascending by u
     points = np.hstack([points, border[:, in_bay[points.shape[1] :]]])
