@@ -9,13 +9,11 @@ from ...geometry.point_in_polygon import find_inside
 from ...geometry.rings import ring_edges
 from ..prices import DEAD_M, NARROW_M
 from ..union.plan import HEIGHT_MARGIN_M
-from ..union.scene import lay_grid, lay_unobserved_cells
+from ..union.scene import LEAST_CELLS, lay_grid, lay_unobserved_cells
 from ..union.whole import Whole
 from .draw import RING_CORNERS
 from .price import Site
 
-# Most cells a side where no point may be seen: with 40, rows of teeth end in wrong places.
-MOST_CELLS = 22
 SHORTEST_EDGE_M = 0.7  # Shortest edge (m) of an outline along whose line a volume may end.
 SHORTEST_CHORD_M = 1.5  # Shortest line (m) between two corners.
 CHORD_CORNERS = 16  # Most corners of an outline with such lines.
@@ -34,7 +32,7 @@ def make_site(whole: Whole, keeps_shapes: bool = False) -> Site:
     outline, points, border = whole.outline, whole.plan.uvz, whole.plan.border
     bays, heights, in_bay = list_bays(outline, np.hstack([points, border]).T)
     density, low, high = points.shape[1] / outline.area, points[2].min(), points[2].max()
-    grid = lay_grid(shapely.get_coordinates(outline), density, MOST_CELLS)
+    grid = lay_grid(shapely.get_coordinates(outline), density, LEAST_CELLS)
     cells = lay_unobserved_cells(whole, grid[0], grid[1], points, density)  # ascending by u
     points = np.hstack([points, border[:, in_bay[points.shape[1] :]]])
     points = points[:, np.argsort(points[0], kind="stable")]

@@ -51,8 +51,9 @@ WRONG_COVER = 0.02  # Price (points) of covering a point without explaining it.
 # Most planes that are found, of all points and of those that a roof leaves unexplained. Structure
 # that explains less stays unseen.
 MOST_PLANES, MOST_NEW_PLANES = 16, 10
-POOL_POINTS = 1200  # Most points among which candidates are found: a limit on time.
-SEEDS = 200  # Most points around which planes are fitted: another.
+# Least points among which candidates are found, and around which planes are fitted: limits on time.
+# Of many points they are three in four, and one in eight.
+LEAST_POOL, LEAST_SEEDS = 500, 100
 
 
 def list_candidates(scene: Scene, members: np.ndarray, most_planes: int) -> np.ndarray:
@@ -82,7 +83,7 @@ def list_candidates_along(
     They are made of every plane of the pool, turned along an axis if necessary, of gables, of all
     pairs that form a ridge, and of larger groups of these.
     """
-    count = min(len(members), POOL_POINTS)
+    count = min(len(members), max(LEAST_POOL, 3 * scene.n // 4))
     numbers = members[np.arange(count) * len(members) // count]
     u, v, z = (
         np.ascontiguousarray(x[numbers]) for x in (scene.U[direction], scene.V[direction], scene.z)
@@ -92,7 +93,7 @@ def list_candidates_along(
     pool = pool_planes(
         cloud,
         grid,
-        list_hypotheses(cloud, SEEDS),
+        list_hypotheses(cloud, max(LEAST_SEEDS, scene.n // 8)),
         tolerance,
         unit,
         most_planes,

@@ -28,7 +28,7 @@ from .planes import Cloud
 from .volumes import DIRECTION, U0
 from .whole import DEAD_M, Box, Whole, clip_to_box
 
-MOST_CELLS = 40  # Most cells a side of a scene. Of a larger one they are wider.
+LEAST_CELLS = 22  # As many cells a side a scene may have, and more where it has many points.
 MOST_WALL_LEAN = 0.6  # Largest lean of walls that planes may face besides those along the axes.
 LEANS_APART = 0.035  # Least difference of two such leans.
 MOST_LEANS = 3  # Most such leans.
@@ -70,7 +70,8 @@ def open_window(whole: Whole, box: Box, most_points: int) -> Scene | None:
     u, v, z = uvz[:, np.argsort(uvz[2], kind="stable")[np.arange(n) * len(numbers) // n]]
     ring = shapely.get_coordinates(part)
     corners = np.array([ring @ np.array([[c, -s], [s, c]]) for c, s in whole.turn])
-    lines = [line for turned in corners for line in lay_grid(turned, n / part.area, MOST_CELLS)]
+    most = max(LEAST_CELLS, math.isqrt(n))
+    lines = [line for turned in corners for line in lay_grid(turned, n / part.area, most)]
     cells = lay_unobserved_cells(whole, lines[0], lines[1], np.array([u, v, z]), n / part.area)
     U, V = turn_to_directions(whole, np.r_[u, cells[0]], np.r_[v, cells[1]])
     return Scene(

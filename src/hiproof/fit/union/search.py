@@ -17,8 +17,9 @@ from .trim import trim
 from .volumes import U0, V1, make_base
 from .whole import Box, Whole, clip_to_box
 
-# Points of a block in which structure is searched: a square metre, at least, and at most.
-SEARCH_DENSITY, LEAST_SEARCH_POINTS, MOST_SEARCH_POINTS = 5.0, 600, 1600
+# Points in which structure is searched, of a house and of a larger roof or block.
+HOUSE_POINTS, BLOCK_POINTS = 600, 1600
+LARGEST_HOUSE_M2 = 200.0  # Area (m2) of the largest house.
 # Points of a block to which its planes are fitted again: 5 per square metre of the largest block.
 FULL_POINTS = 3000
 LEAST_HALF_M2 = 1.0  # Least area (m2) of outline on either side of a cut.
@@ -35,7 +36,7 @@ def find_volumes(whole: Whole) -> np.ndarray:
 
 def count_search_points(area_m2: float) -> int:
     """Return how many points of a block are searched at most."""
-    return min(MOST_SEARCH_POINTS, max(LEAST_SEARCH_POINTS, int(SEARCH_DENSITY * area_m2)))
+    return HOUSE_POINTS if area_m2 <= LARGEST_HOUSE_M2 else BLOCK_POINTS
 
 
 def search_box(whole: Whole, raster: HeightRaster, box: Box, area_m2: float) -> list[np.ndarray]:
