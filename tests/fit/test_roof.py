@@ -186,9 +186,10 @@ def test_a_slope_below_zero_names_the_parts_that_the_same_planes_have_otherwise(
     plan = lay_out_plan(*scan_compound(kind))
     improve_all(roof, site)
     parts = read_parts(roof, site, outline, plan, ())
-    slopes = roof.slopes[roof.slopes >= 0]
-    roof.values[np.unique(slopes)] *= -1.0
-    roof.plane_lines[roof.slopes >= 0] *= -1
+    slopes = (roof.slopes >= 0) & (np.arange(roof.slopes.shape[1]) < roof.n_planes[:, None])
+    slopes[roof.counts[VOLUME_COUNT] :] = False  # what was there before
+    roof.values[np.unique(roof.slopes[slopes])] *= -1.0
+    roof.plane_lines[slopes] *= -1
     for k in range(roof.counts[VOLUME_COUNT]):
         place_volume(roof, k)
     turned = read_parts(roof, site, outline, plan, ())
