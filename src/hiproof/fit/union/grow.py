@@ -1,7 +1,7 @@
 """Grow a roof from its base.
 
-Volumes are added where they gain most. Then the first of them are taken out in turn, and their
-places are grown anew.
+Volumes are added where they gain most. Then the first of them is taken out, and its place is grown
+anew.
 """
 
 from __future__ import annotations
@@ -32,12 +32,11 @@ from .volumes import N_SIDES, OFFSET0, SLOPE0, make_base
 MOST_ADDITIONS = 20  # Most additions tried for one building: a limit on time.
 # Quantile of the heights at which the base lies: below all roofs but not below a stray point.
 BASE_QUANTILE = 0.02
-REGROWN = 1  # Volumes, the first ones, that are grown anew.
 IMPROVING_ROUNDS = 2  # Most rounds of all moves where no volume is added.
 
 
 def grow(scene: Scene) -> tuple[np.ndarray, float]:
-    """Grow volumes (k, COLUMNS) from the base, and regrow the first of them.
+    """Grow volumes (k, COLUMNS) from the base, and regrow the first one.
 
     Also returns their objective.
     """
@@ -58,28 +57,23 @@ def prepare_growth(scene: Scene, candidates: np.ndarray) -> GrowthGrid:
 
 
 def regrow_volumes(
-    volumes: np.ndarray,
-    value: float,
-    ground: GrowthGrid,
-    candidates: np.ndarray,
+    volumes: np.ndarray, value: float, ground: GrowthGrid, candidates: np.ndarray
 ) -> tuple[np.ndarray, float]:
-    """Take out each of the first volumes in turn, and grow anew what is missing.
+    """Take out the first volume, and grow anew what is missing.
 
-    A change is kept if it is clearly better. The volume that gains most by itself comes first, and
-    what follows fits in around it: two hips of one pitch begin as one volume over both. Without it,
-    the others take their own places.
+    The change is kept if it is clearly better. The volume that gains most by itself comes first,
+    and what follows fits in around it: two hips of one pitch begin as one volume over both. Without
+    it, the others take their own places.
     """
-    k, scene = min(len(volumes) - 1, REGROWN), ground.scene
-    while k > 0 and len(volumes) > 2:
-        trial = remove_volume(volumes, k)
-        trial, trial_value = improve(
-            trial, scene, compute_objective(trial, scene), ground.slopes, IMPROVING_ROUNDS
-        )
-        trial, trial_value = grow_volumes(trial, trial_value, ground, candidates)
-        if trial_value < value - REGROWN_UNITS * scene.unit:
-            volumes, value = trial, trial_value
-        k = min(k, len(volumes)) - 1
-    return volumes, value
+    if len(volumes) < 3:
+        return volumes, value
+    trial, scene = remove_volume(volumes, 1), ground.scene
+    trial, trial_value = improve(
+        trial, scene, compute_objective(trial, scene), ground.slopes, IMPROVING_ROUNDS
+    )
+    trial, trial_value = grow_volumes(trial, trial_value, ground, candidates)
+    is_better = trial_value < value - REGROWN_UNITS * scene.unit
+    return (trial, trial_value) if is_better else (volumes, value)
 
 
 def grow_volumes(

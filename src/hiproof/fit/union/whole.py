@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import shapely
 
+from ...settings import CompoundSettings
 from ..prices import compute_unit
 from .allowed import list_allowed_shapes
 from .depth import DepthRaster, make_depth_raster
@@ -51,7 +52,7 @@ class Whole:
     raster: DepthRaster
     turn: np.ndarray
     allowed: np.ndarray
-    settings: Any
+    settings: CompoundSettings
 
     @property
     def width(self) -> float:
@@ -75,7 +76,10 @@ class Whole:
 
 
 def lay_out_whole(
-    plan: Plan, outline: shapely.Polygon, settings, types: tuple[str, ...] = ()
+    plan: Plan,
+    outline: shapely.Polygon,
+    settings: CompoundSettings,
+    types: tuple[str, ...] = (),
 ) -> Whole:
     """Lay out a building for the search. `settings` are those of [compound].
 
