@@ -38,7 +38,7 @@ def make_site(whole: Whole, keeps_shapes: bool = False) -> Site:
     points = points[:, np.argsort(points[0], kind="stable")]
     n, nothing = points.shape[1], np.zeros(cells.shape[1])
     x, y, z = np.hstack([points, [*cells[:2], nothing]])
-    weight, shade = np.hstack([[np.ones(n), np.zeros(n)], cells[2:]])
+    weight, shade = np.ascontiguousarray(np.hstack([[np.ones(n), np.zeros(n)], cells[2:]]))
     rings = split_convex(outline)
     parts, sizes = np.zeros((len(rings), RING_CORNERS, 2)), np.array([len(r) for r in rings])
     for part, ring in zip(parts, rings, strict=True):
