@@ -20,13 +20,14 @@ point, and volumes those under the shape.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
 
 from hiproof.fit.roof import fit_building
+from hiproof.model import Part
 from hiproof.model.heights import find_highest
 from hiproof.primitives import CATALOGUE
 from hiproof.primitives.catalogue import ROUND
@@ -146,7 +147,11 @@ class CurvedOutcome:
 
 def judge_scene(scene: CurvedScene) -> CurvedOutcome:
     """Fit the building of a scene, and compare it with the truth."""
-    parts = fit_building(scene.points, scene.outline).roof_parts
+    return judge_parts(scene, fit_building(scene.points, scene.outline).roof_parts)
+
+
+def judge_parts(scene: CurvedScene, parts: Sequence[Part]) -> CurvedOutcome:
+    """Compare the parts found in a scene with the truth."""
     xy = make_grid(scene.plan, scene.plan.intersection(scene.outline))
     true, found = scene.height_at(xy), find_highest(parts, xy)[0]
     of_kind = [part for part in parts if part.type == scene.kind]
