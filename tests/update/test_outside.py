@@ -203,6 +203,24 @@ def test_an_extension_of_three_metres_is_found_wherever_it_lies(aside, tmp_path)
     assert summary.outside == {"extended": 1}
 
 
+@pytest.mark.parametrize("aside", [0.1, 0.3, 0.5, 0.7, 0.9])
+def test_eaves_hide_no_small_extension(aside, tmp_path):
+    """Of 10 m2 beside a wall, 2.5 m deep, the earlier survey shows eaves over 0.4 m."""
+    before, after = (make_town(houses=1, seed=seed, density=8.0) for seed in (0, 7))
+    put_block(after, (20, 13, 22.1, 17))
+    for name, town in (("first", before), ("second", after)):
+        write_cloud(tmp_path / f"{name}.laz", town.xyz + [aside, aside, 0], town.classification)
+    walls = {
+        id: shapely.transform(shapely.buffer(f, -0.4, join_style="mitre"), lambda xy: xy + aside)
+        for id, f in before.footprints.items()
+    }
+    footprints = str(write_footprints(tmp_path / "footprints.geojson", walls))
+    reconstruct_area(Request((str(tmp_path / "first.laz"),), tmp_path / "run", footprints))
+    second = (str(tmp_path / "second.laz"),)
+    summary = update_area(UpdateRequest(second, tmp_path / "out", run=tmp_path / "run", date=DATE))
+    assert summary.outside == {"extended": 1}
+
+
 @pytest.mark.parametrize("densities", [(8.0, 1.0), (1.0, 1.0), (1.0, 8.0)])
 def test_roofs_outside_are_found_in_sparse_surveys(densities, tmp_path):
     """Of a survey of 1 point/m2 a third of the cells hold no points, which part no roof."""

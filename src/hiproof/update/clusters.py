@@ -41,8 +41,9 @@ HEIGHT_STEP_M = 1.0
 
 LOG_LEAST = -600.0  # of a chance; float64 holds no smaller one
 
-PLANE_NEIGHBOURS, FEWEST_SURFACE_POINTS = 5, 9
-"""Points that a local plane is laid through, and points below which chance makes a surface."""
+PLANE_NEIGHBOURS, FEWEST_LOCAL_POINTS, FEWEST_SURFACE_POINTS = 5, 9, 7
+"""Points that a local plane is laid through, points below which one plane goes through all, and
+points below which chance makes a surface: seven in a crown lie on a plane once in 500 times."""
 
 ROUGH_M = 0.12
 """Scatter (m) of points about local planes, beyond which they lie on no surface: leaves scatter by
@@ -212,9 +213,12 @@ def find_points(comparison: CellComparison, members: np.ndarray, difference: flo
     return np.asarray(np.isin(c.number, members) | around)
 
 
-def is_strip(points: np.ndarray) -> bool:
-    """Return whether points (n, 3) lie in a long and narrow strip of the plan."""
-    spread = np.linalg.eigvalsh(np.cov(points[:, :2].T))
+def is_strip(points: np.ndarray, cell_m: float = 0.0) -> bool:
+    """Return whether points (n, 2 or more) lie in a long and narrow strip of the plan.
+
+    Each may be the mean of points in a cell of `cell_m`.
+    """
+    spread = np.linalg.eigvalsh(np.cov(points[:, :2].T)) + cell_m**2 / 12
     width, length = np.sqrt(12 * np.maximum(spread, 0.0))  # of a strip with even points
     return bool(width < STRIP_WIDTH_M and length > STRIP_SHARE * width)
 
@@ -247,11 +251,12 @@ def measure_roughness(points: np.ndarray) -> float:
         return math.inf
     from scipy.spatial import KDTree  # only where a building may have changed
 
-    near = points[KDTree(points).query(points, PLANE_NEIGHBOURS)[1]]
+    neighbours = PLANE_NEIGHBOURS if len(points) >= FEWEST_LOCAL_POINTS else len(points)
+    near = points[KDTree(points).query(points, neighbours)[1]]
     near = near - near.mean(axis=1, keepdims=True)
     xy, z = near[:, :, :2], near[:, :, 2:]
     across = xy.transpose(0, 2, 1)
     ridge = (USUAL_NOISE_M / USUAL_SLOPE) ** 2 * np.eye(2)
     slopes = np.linalg.solve(across @ xy + ridge, across @ z)
-    scatter = np.sqrt(((z - xy @ slopes) ** 2).sum(axis=(1, 2)) / (PLANE_NEIGHBOURS - 3))
+    scatter = np.sqrt(((z - xy @ slopes) ** 2).sum(axis=(1, 2)) / (neighbours - 3))
     return float(np.median(scatter))

@@ -1,8 +1,9 @@
 """Roofs outside all outlines: new buildings, extensions, and others.
 
 Both surveys are compared in cells of a metre, wherever the clouds have points of the building
-classes. Cells along outlines and along roofs of the other survey start nothing, since gutters and
-misfits lie there. In clouds without building classes, level cells high above the ground are roofs.
+classes. Cells along outlines, and along roofs of the other survey away from these, start nothing,
+since gutters and misfits lie there. In clouds without building classes, level cells high above the
+ground are roofs.
 """
 
 from __future__ import annotations
@@ -35,11 +36,14 @@ BESIDE_M = 1.0
 """Distance (m) from an outline within which roofs belong to it: gutters, and outlines drawn within
 some decimetres."""
 
+EAVES_M = 0.5
+"""Depth (m) of eaves that the other survey shows between an outline and a new roof beside it."""
+
 FEWEST_OUTSIDE, FEWEST_BEYOND = 8, 2
 """Cells of 1 m2 that a roof has, and that it has beyond that distance: a shed of 3 by 3 m has them,
 and what fills a gap of 5 m between neighbours."""
 
-SPARSE = 0.8
+SPARSE = 0.9
 """Share of the cells of a roof that hold points, below which chance parts a roof into pieces, so
 cells belong together that lie up to two cells apart: 1.6 points/m2."""
 
@@ -249,11 +253,11 @@ def find_fresh(
     `roofs` (k, 5) are the cells of one survey, `other` those of the other one. A roof beside a
     building extends it where `names` of the buildings are known.
     """
-    known = find_keys(other["roof"])
+    known, is_beside = find_keys(other["roof"]), touches(other["roof"], outlines, BESIDE_M)
     points = roofs[~np.isin(find_keys(roofs), known)]
     points = points[~touches(points, outlines, 0.0)]
     around = find_keys(points)[:, None] + AROUND_KEYS
-    near = touches(points, outlines, BESIDE_M) | np.isin(around, known).any(axis=1)
+    near = touches(points, outlines, BESIDE_M) | np.isin(around, known[~is_beside]).any(axis=1)
     on_ground = np.isin(find_keys(points), find_keys(other["ground"]))
     filled = predict_occupancy(roofs[:, 4])
     found = describe_roofs(points, filled, ~near, on_ground, other["ground"], outlines, kind)
@@ -316,7 +320,8 @@ def describe_roofs(
             "height": height if height is None else round(height, 2),
             "confidence": share if share is None else round(share, 2),
         }
-        beside = outlines.query(place, predicate="dwithin", distance=BESIDE_M)
+        reach = BESIDE_M + (EAVES_M if kind is ChangeKind.BUILT else 0.0)
+        beside = outlines.query(place, predicate="dwithin", distance=reach)
         around = shapely.buffer(place, 2 * BESIDE_M)
         shared = shapely.area(shapely.intersection(outlines.geometries[beside], around))
         yield place, beside[np.argsort(-shared, kind="stable")], record
@@ -347,7 +352,7 @@ def group_cells(points: np.ndarray, is_core: np.ndarray, filled: float) -> Itera
         members = core[labels == label]
         grown = np.isin(keys, keys[members, None] + AROUND_KEYS) & ~is_core
         place = np.union1d(members, np.flatnonzero(grown))
-        if len(place) < FEWEST_OUTSIDE * filled or is_strip(points[place]):
+        if len(place) < FEWEST_OUTSIDE * filled or is_strip(points[place], 1.0):
             continue
         if measure_roughness(points[place, :3]) <= ROUGH_M:
             yield place
