@@ -141,7 +141,7 @@ def test_heaps_of_the_building_class_on_bare_ground_are_no_building(tmp_path):
 @pytest.mark.parametrize("has_classes", [True, False])
 @pytest.mark.filterwarnings("ignore::hiproof.errors.InputWarning")
 def test_a_parcel_around_a_house_is_named(has_classes, tmp_path):
-    xyz, classes = scan()
+    xyz, classes = scan(density=3.0)
     parcel = shapely.box(X - 22, Y - 22, X + 38, Y + 34)
     record, _ = run(tmp_path, xyz, classes if has_classes else np.ones_like(classes), parcel)
     assert record["status"] == "no_building"

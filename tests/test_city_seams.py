@@ -10,6 +10,7 @@ from hiproof.errors import InputWarning
 from tiny_town import make_town, write_cloud, write_footprints
 
 TOWN = make_town(6)
+pytestmark = pytest.mark.usefixtures("quick_tiles")  # steps are found before anything is fitted
 
 
 def run_files(folder, files, classes=TOWN.classification):
