@@ -15,9 +15,9 @@ import shapely
 
 from ..errors import InputError
 from ..log import count_things
-from ..parametric.file import DAMAGED, objects, parse_object, read_head
+from ..parametric.file import DAMAGED, located_parameters, read_at
 from ..parametric.record import refuse_other_kinds
-from ..read.models.damage import SkippedBuildings, excerpt
+from ..read.models.damage import SkippedBuildings
 from ..settings import Settings
 from ..status import Attention, Change, Grade, Status, find_attention
 from ..status import Doubt as Remark
@@ -157,11 +157,8 @@ class RunFolder:
                 f"expected a building of the run in {self.folder}, got {id!r:.80}; choose one of "
                 "the list"
             )
-        with self.path.open("rb") as file:
-            file.seek(row.start)
-            line = file.readline()
         try:
-            record = parse_object(line.decode(errors="replace").rstrip(), str(self.path))
+            record = read_at(self.path, row.start)
         except InputError:
             record = None
         if not isinstance(record, dict) or record.get("id") != id:
@@ -173,37 +170,12 @@ class RunFolder:
 
 def read_rows(path: Path) -> tuple[FileHead, list[BuildingRow]]:
     """Read the head of the parameters at `path`, and a row a building."""
-    starts: list[int] = []
-
-    def lines(file: Any):
-        place = 0
-        for line in file:
-            starts.append(place)
-            place += len(line)
-            yield line.decode()
-
-    left_out = SkippedBuildings()
-    try:
-        with path.open("rb") as file:
-            result = objects(lines(file), path, left_out)
-            head = read_head(next(result, (1, None))[1], path)
-            undamaged = ((number, record) for number, record in result if record is not DAMAGED)
-            rows = [
-                read_row(number, record, starts[number - 1], path) for number, record in undamaged
-            ]
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(
-            f"expected parameters that hiproof wrote at {path}, got: {error}; check the file"
-        ) from error
-    return head, rows
+    with located_parameters(path, SkippedBuildings()) as (head, located):
+        return head, [read_row(*place) for place in located if place[1] is not DAMAGED]
 
 
-def read_row(number: int, record: Any, start: int, path: Path) -> BuildingRow:
+def read_row(start: int, record: dict[str, Any]) -> BuildingRow:
     """Return the row of a building's object, most doubtful where it cannot be read."""
-    if not isinstance(record, dict) or not isinstance(record.get("id"), str):
-        raise InputError(
-            f"expected a building in line {number} of {path}, got {excerpt(record)}; mend it there"
-        )
     try:
         refuse_other_kinds(record)
     except InputError as error:

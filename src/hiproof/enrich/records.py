@@ -18,7 +18,7 @@ from ..errors import HiproofError, InputError
 from ..masking import mask
 from ..model import Building
 from ..parametric.building import build
-from ..parametric.file import opened_parameters, parse_object
+from ..parametric.file import located_parameters, opened_parameters, read_at
 from ..status import Status
 from ..write.head import FileHead
 from ..write.naming import UniqueNames, gml_name
@@ -59,29 +59,24 @@ def index_records(path: Path, use_attribute: str = "") -> Index:
     attributes: dict[str, None] = {}
     uses: dict[str, None] = {}
     names, renamed = UniqueNames(), {}
-    with path.open("rb") as file:
-        file.readline()
-        at = file.tell()
-        for number, line in enumerate(file, 2):
-            if line.strip():
-                record = parse_record(line, f"line {number} of {path}")
-                id = plain_text(record["id"])
-                if id in ids:
-                    raise InputError(
-                        f"expected buildings of different ids in {path}, got {id!r} twice; give "
-                        "one another"
-                    )
-                ids.add(id)
-                if isinstance(record.get("attributes"), dict):
-                    attributes.update(dict.fromkeys(record["attributes"]))
-                    uses[str(record["attributes"].get(use_attribute) or "")] = None
-                name = names.take(gml_name(record["id"]))
-                if name != gml_name(record["id"]):
-                    renamed[len(offsets)] = name
-                offsets.append(at)
-                boxes.extend(find_box(record))
-                modelled.append(bool(record.get("parts")))
-            at += len(line)
+    with located_parameters(path) as (_, located):
+        for place, record in located:
+            id = plain_text(record["id"])
+            if id in ids:
+                raise InputError(
+                    f"expected buildings of different ids in {path}, got {id!r} twice; give one "
+                    "another"
+                )
+            ids.add(id)
+            if isinstance(record.get("attributes"), dict):
+                attributes.update(dict.fromkeys(record["attributes"]))
+                uses[str(record["attributes"].get(use_attribute) or "")] = None
+            name = names.take(gml_name(record["id"]))
+            if name != gml_name(record["id"]):
+                renamed[len(offsets)] = name
+            offsets.append(place)
+            boxes.extend(find_box(record))
+            modelled.append(bool(record.get("parts")))
     return Index(
         np.array(offsets, np.int64),
         np.array(boxes, float).reshape(-1, 4),
@@ -91,17 +86,6 @@ def index_records(path: Path, use_attribute: str = "") -> Index:
         np.array(list(attributes), str),
         np.array(list(uses), str),
     )
-
-
-def parse_record(line: bytes, where: str) -> dict[str, Any]:
-    """Parse the record of a building on a line."""
-    try:
-        record = parse_object(line.decode().rstrip(), where)
-    except UnicodeDecodeError as error:
-        raise InputError(f"expected UTF-8 text in {where}, got: {error}; mend it") from error
-    if not (isinstance(record, dict) and isinstance(record.get("id"), str)):
-        raise InputError(f"expected a JSON object with an id in {where}, got none; mend it")
-    return record
 
 
 def find_box(record: dict[str, Any]) -> tuple[float, ...]:
@@ -122,7 +106,6 @@ class Records:
         self.path, self.index = path, index
         with opened_parameters(path) as (head, _):
             self.head: FileHead = head
-        self.file = path.open("rb")
         self.tree = shapely.STRtree(
             [shapely.Point() if np.isnan(b[0]) else shapely.box(*b) for b in index.boxes]
         )
@@ -135,8 +118,7 @@ class Records:
 
     def compose(self, number: int) -> Building:
         """Read and compose building `number`, without a model and with a detail if it fails."""
-        self.file.seek(int(self.index.offsets[number]))
-        record = parse_record(self.file.readline(), f"building {number + 1} of {self.path}")
+        record = read_at(self.path, int(self.index.offsets[number]))
         try:
             return measure_or_drop_solid(build(record, self.head.compose))[0]
         except HiproofError as error:

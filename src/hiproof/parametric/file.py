@@ -7,7 +7,7 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from ..errors import InputError, SettingsError
 from ..read.crs import parse_crs
@@ -42,28 +42,51 @@ def opened_parameters(
     Buildings come one by one. A line that cannot be read is told to `damaged`, which refuses the
     file by default, and comes as DAMAGED. Raises InputError for a file that is no parameters.jsonl.
     """
+    with located_parameters(path, damaged) as (head, located):
+        yield head, (record for _, record in located)
+
+
+@contextmanager
+def located_parameters(
+    path: str | os.PathLike[str], damaged: Damaged = refuse
+) -> Iterator[tuple[FileHead, Iterator[tuple[int, dict[str, Any]]]]]:
+    """Do as `opened_parameters`, with the place of each building for `read_at`."""
     try:
-        # Editors may begin it with a mark of the encoding.
-        with Path(path).open(encoding="utf-8-sig") as file:
+        with Path(path).open("rb") as file:
             lines = objects(file, path, damaged)
-            yield read_head(next(lines, (1, None))[1], path), records(lines, path, damaged)
+            yield read_head(next(lines, (1, 0, None))[2], path), records(lines, path, damaged)
     except (OSError, UnicodeDecodeError) as error:
         expected = "a parameters.jsonl that hiproof wrote"
         raise explain_unreadable(os.fspath(path), expected, error) from error
 
 
 def objects(
-    file: Any, path: str | os.PathLike[str], damaged: Damaged = refuse
-) -> Iterator[tuple[int, Any]]:
-    """Yield (line, JSON value) of lines that are not blank, DAMAGED where `damaged` took one."""
-    for number, line in enumerate(file, 1):
-        if line.strip():
+    file: BinaryIO, path: str | os.PathLike[str], damaged: Damaged = refuse
+) -> Iterator[tuple[int, int, Any]]:
+    """Yield (line, its first byte, JSON value) of lines that are not blank.
+
+    The value is DAMAGED where `damaged` took one.
+    """
+    start = 0
+    for number, content in enumerate(file, 1):
+        # Editors may begin a file with a mark of the encoding.
+        line = content.decode("utf-8-sig" if number == 1 else "utf-8").rstrip()
+        if line:
             try:
-                value = parse_object(line.rstrip(), f"line {number} of {os.fspath(path)}")
+                value = parse_object(line, f"line {number} of {os.fspath(path)}")
             except InputError as error:
                 damaged(error)
                 value = DAMAGED
-            yield number, value
+            yield number, start, value
+        start += len(content)
+
+
+def read_at(path: Path, start: int) -> Any:
+    """Read the JSON value of the line that begins at byte `start`."""
+    with path.open("rb") as file:
+        file.seek(start)
+        line = file.readline().decode(errors="replace")
+    return parse_object(line.rstrip(), f"the line at byte {start} of {path}")
 
 
 def parse_object(line: str, place: str) -> Any:
@@ -114,10 +137,10 @@ def read_head(record: Any, path: str | os.PathLike[str]) -> FileHead:
 
 
 def records(
-    lines: Iterator[tuple[int, Any]], path: str | os.PathLike[str], damaged: Damaged = refuse
-) -> Iterator[dict[str, Any]]:
-    """Yield the buildings after the head. Raises InputError for a second head."""
-    for number, record in lines:
+    lines: Iterator[tuple[int, int, Any]], path: str | os.PathLike[str], damaged: Damaged = refuse
+) -> Iterator[tuple[int, dict[str, Any]]]:
+    """Yield (place, object) of the buildings after the head. Raises InputError for a second one."""
+    for number, start, record in lines:
         if isinstance(record, dict) and HEAD_KEY in record:
             raise InputError(
                 f"expected one head in {os.fspath(path)}, got another in line {number}, so files "
@@ -133,4 +156,4 @@ def records(
                 )
             )
             record = DAMAGED
-        yield record
+        yield start, record

@@ -81,9 +81,8 @@ def override_records(path: str) -> Iterator[tuple[str, dict[str, Any]]]:
         )
         return
     try:
-        # editors may begin it with a mark of the encoding
-        with Path(path).open(encoding="utf-8-sig") as file:
-            for number, record in objects(file, path):
+        with Path(path).open("rb") as file:
+            for number, _, record in objects(file, path):
                 # the head and buildings without a model say nothing of how to build
                 if not isinstance(record, dict) or not (
                     HEAD_KEY in record or ("status" in record and not record.get("parts"))
