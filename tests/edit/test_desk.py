@@ -228,7 +228,7 @@ def test_two_windows_lose_nothing(folder):
 
 def test_no_process_writes_over_another(folder):
     """Two processes accept on one folder at once, each other buildings."""
-    with ProcessPoolExecutor(2, get_context("spawn")) as pool:
+    with ProcessPoolExecutor(2, get_context("forkserver")) as pool:
         accepted = list(pool.map(accept_overrides, [folder] * 2, range(2)))
     stored = {id: record["ridge_height"] for id, record in read_overrides(str(folder / EDITS_FILE))}
     assert stored == {id: height for heights in accepted for id, height in heights.items()}
