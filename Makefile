@@ -2,6 +2,8 @@
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
+# what is never imported need not become bytecode: half of the time of an installation
+INSTALL := bin/pip install --quiet --disable-pip-version-check --no-compile
 # one thread for linear algebra: the work is many small buildings, and processes are how they share the cores
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
@@ -13,23 +15,23 @@ unexport PYTHONDONTWRITEBYTECODE
 $(VENV)/core: pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	@echo "Installing hiproof and the packages that it needs into $(VENV); this takes a minute"
-	$(BIN)/pip install --quiet --disable-pip-version-check -e .
+	$(VENV)/$(INSTALL) -e .
 	touch $@
 
 $(VENV)/test: $(VENV)/core
-	$(BIN)/pip install --quiet --disable-pip-version-check -e '.[test,city]'
+	$(VENV)/$(INSTALL) -e '.[test,city]'
 	touch $@
 
 $(VENV)/train: $(VENV)/test
-	$(BIN)/pip install --quiet --disable-pip-version-check torch==2.13.0 onnx matplotlib
+	$(VENV)/$(INSTALL) torch==2.13.0 onnx matplotlib
 	touch $@
 
 $(VENV)/lint: $(VENV)/core
-	$(BIN)/pip install --quiet --disable-pip-version-check -e '.[lint]'
+	$(VENV)/$(INSTALL) -e '.[lint]'
 	touch $@
 
 $(VENV)/docs: $(VENV)/core
-	$(BIN)/pip install --quiet --disable-pip-version-check -e '.[docs]'
+	$(VENV)/$(INSTALL) -e '.[docs]'
 	touch $@
 
 demo: $(VENV)/core
@@ -44,7 +46,7 @@ test: $(VENV)/test
 # the oldest numba that pyproject.toml allows, and the newest NumPy that it takes
 $(VENV)-oldest/core: pyproject.toml
 	$(PYTHON) -m venv $(VENV)-oldest
-	$(VENV)-oldest/bin/pip install --quiet --disable-pip-version-check 'numba==0.62.*' pytest hypothesis pytest-timeout -e .
+	$(VENV)-oldest/$(INSTALL) 'numba==0.62.*' pytest hypothesis pytest-timeout -e .
 	touch $@
 
 # without the two tests that would compile all that runs call for this numba, too: minutes
