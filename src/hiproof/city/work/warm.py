@@ -67,6 +67,7 @@ def compile_halves() -> bool:
             for half in HALVES
         ]
     except OSError as error:
+        news.processes = 1
         LOGGER.debug("nothing could be compiled beforehand: %s", error)
         return False
     finally:
