@@ -58,10 +58,11 @@ ODD = {
 """(ring about the town's origin, status) by name."""
 
 
-def write_beside_a_sound_one(path: Path, ring: np.ndarray | list) -> Path:
-    """A GeoJSON file of two footprints, "odd" and "sound"."""
+def write_beside_a_sound_one(path: Path) -> Path:
+    """A GeoJSON file of all odd footprints and one called "sound"."""
     sound = shapely.get_coordinates(SOUND_IN_THE_WORLD)
-    rings = {"odd": np.asarray(ring, float) + ORIGIN[:2], "sound": sound}
+    rings = {name: np.asarray(ring, float) + ORIGIN[:2] for name, (ring, _) in ODD.items()}
+    rings["sound"] = sound
     features = [
         {
             "type": "Feature",

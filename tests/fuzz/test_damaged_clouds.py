@@ -98,12 +98,15 @@ def test_a_changed_byte_before_the_points_is_noticed_or_changes_nothing(name, so
 
 
 @pytest.mark.parametrize("with_footprints", [True, False], ids=["with footprints", "without"])
-def test_damaged_clouds_are_named_and_harm_no_building(with_footprints, tmp_path, monkeypatch):
+def test_damaged_clouds_are_named_and_harm_no_building(
+    with_footprints, corpus, tmp_path, monkeypatch
+):
+    """Every fifth of them: what is said of each is checked above."""
     if with_footprints:
         monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     cloud, footprints = map(str, write_town(tmp_path, make_town(2, 3.0)))
     footprints = footprints if with_footprints else None
-    damaged = {str(case.path): case.sentence for case in damaged_clouds(tmp_path / "damaged")}
+    damaged = {str(case.path): case.sentence for case in corpus[::5]}
     single_run = reconstruct_area(Request((cloud,), tmp_path / "alone", footprints))
     summary = reconstruct_area(Request((cloud, *damaged), tmp_path / "together", footprints))
     assert single_run.exit_code == 0 and summary.exit_code == 2
@@ -113,8 +116,8 @@ def test_damaged_clouds_are_named_and_harm_no_building(with_footprints, tmp_path
     assert records(tmp_path / "together") == records(tmp_path / "alone")
 
 
-def test_a_run_of_damaged_clouds_alone_is_refused(tmp_path):
+def test_a_run_of_damaged_clouds_alone_is_refused(corpus, tmp_path):
     _, footprints = write_town(tmp_path, make_town(2, 3.0))
-    paths = [str(case.path) for case in damaged_clouds(tmp_path / "damaged")[:3]]
+    paths = [str(case.path) for case in corpus[:3]]
     with pytest.raises(InputError, match="expected"):
         reconstruct_area(Request(tuple(paths), tmp_path / "out", str(footprints)))
