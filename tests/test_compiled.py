@@ -567,18 +567,6 @@ for given in (with_footprints, few, one):
     assert run(tmp_path, script) == "[]\n[]\n[]\n"
 
 
-def test_without_the_network_all_is_compiled_beforehand(tmp_path):
-    """A core install has none: the process ended there, and each run started it again."""
-    script = """
-import sys
-sys.modules["onnxruntime"] = None
-from hiproof.city.work.warm import compile_half
-compile_half("all")
-print("done")
-"""
-    assert run(tmp_path, script) == "done\n"
-
-
 @pytest.mark.parametrize("total", [1, 7, 222])
 def test_the_news_of_compiling_is_a_headline_and_ten_lines_at_most(total):
     lines = []

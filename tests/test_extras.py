@@ -15,6 +15,7 @@ from click.testing import CliRunner
 import hiproof
 import hiproof.learn
 from hiproof.city.run import Request, reconstruct_area
+from hiproof.city.work.warm import compile_half
 from hiproof.edit.points import RunPoints
 from hiproof.errors import InputError
 from hiproof.segment import inference, segment
@@ -212,6 +213,12 @@ def test_the_page_says_at_once_that_a_terrain_model_cannot_be_read(
     assert RunPoints(out).missing == ""
     hide_package("rasterio")
     assert "all but refitting works (expected the package rasterio" in RunPoints(out).missing
+
+
+def test_without_the_network_all_is_compiled_beforehand(hide_package):
+    """A core install has none: the process ended there, and each run started it again."""
+    hide_package("onnxruntime")
+    compile_half("all")
 
 
 def test_the_demo_asks_for_no_extra(tmp_path):
