@@ -6,6 +6,7 @@ import json
 import re
 import warnings
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -27,8 +28,10 @@ from tiny_town import ORIGIN, Town, write_cloud, write_footprints
 SHARED = Path(__file__).parents[2] / "shared" / "data"
 OFF = Settings.from_dict({"reconstruct": {"align": "off"}})
 SHIFT = np.array([1.2, -0.8])
+read_once = cache(read_set)
 
 
+@cache
 def scattered_houses(rows: int = 5, columns: int = 5) -> Town:
     """Flat houses of different sizes in a grid, every 50 m one, with ground around."""
     rng = np.random.default_rng(3)
@@ -207,7 +210,7 @@ def test_known_shifts_of_a_small_set_are_told(distance, azimuth, tmp_path):
 @pytest.mark.parametrize("name", SETS)
 @pytest.mark.parametrize("distance", [0.0, 1.0, 3.0])
 def test_known_shifts_of_real_footprints_are_found_or_told(name, distance):
-    polygons, points = read_set(name)
+    polygons, points = read_once(name)
     turn = np.random.default_rng(len(polygons)).uniform(0, 2 * np.pi)
     vector = distance * np.array([np.cos(turn), np.sin(turn)])
     result = register([(points[:, :2], shift_polygons(polygons, vector))])

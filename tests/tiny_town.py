@@ -3,6 +3,7 @@ enough for any test.
 """
 
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import laspy
@@ -36,6 +37,12 @@ def make_town(houses: int = 4, density: float = 6.0, seed: int = 0) -> Town:
     """Gables and flat blocks in a row along a street that rises a little; ground around them, a
     tree, some noise.
     """
+    town = draw_town(houses, density, seed)
+    return Town(town.xyz.copy(), town.classification.copy(), dict(town.footprints))
+
+
+@cache
+def draw_town(houses: int, density: float, seed: int) -> Town:
     rng = np.random.default_rng(seed)
     points, classes, footprints = [], [], {}
     area = (30.0 * houses, 40.0)
