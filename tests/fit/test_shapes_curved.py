@@ -106,7 +106,7 @@ def test_two_halves_of_a_spire_become_one_with_equal_sides(setting, seed):
 
 
 def test_a_spire_on_a_tower_stands_on_one_level_part():
-    """Strips beside it would leave a moat where they lie higher than its eave (40 of 40 seeds)."""
+    """Strips beside it would leave a moat where they lie higher than its eave (21 of 24 seeds)."""
     found = 0
     for seed in range(4):
         scene, parts = fit_scene("broach", "tower", seed)

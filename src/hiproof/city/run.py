@@ -59,11 +59,7 @@ RESULTS = ("by_status", "by_quality", "by_type", "broken_inputs", "seconds")
 
 @dataclass(frozen=True)
 class Summary:
-    """The result of a run.
-
-    It says where the models are, how many buildings were modelled and how well, counts buildings by
-    status and type, and names input that could not be used, with the seconds of each step.
-    """
+    """The result of a run: models, counts by status and type, unusable input, and timings."""
 
     models: tuple[Path, ...]
     overview: Overview
@@ -250,10 +246,7 @@ def summarise(request: Request, plan: WorkPlan, ledger: Ledger, clock: Clock) ->
 
 
 def write_run_record(request: Request, plan: WorkPlan, summary: Summary) -> None:
-    """Write run.json: version, settings, inputs, counts and timings.
-
-    It is the only file of a run that knows the time.
-    """
+    """Write run.json, the only file of a run that knows the time."""
     footprints = choose_footprints(request)
     inputs = {name: getattr(request, name) for name in INPUTS} | {"footprints": footprints}
     if request.underpasses:

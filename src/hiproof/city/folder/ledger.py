@@ -1,6 +1,4 @@
-"""The record of what is done, what failed and why.
-
-It is SQLite in WAL mode, from the standard library.
+"""The record of what is done, what failed and why, in SQLite with a write-ahead log.
 
 SQLite rather than DuckDB: it needs no further dependency, survives kill -9 at any moment, and
 `hiproof status` may read while the run writes. Only the main process writes; a row changes after
@@ -49,7 +47,7 @@ class Task(NamedTuple):
 class Outcome(NamedTuple):
     """What came of a building, and where its texts are.
 
-    It has the `position` in the plan. The texts are number `number` of `file`, in the folder of
+    `position` is its place in the plan. Its texts are number `number` of `file` in the folder of
     texts.
     """
 
@@ -94,7 +92,7 @@ class Claim(NamedTuple):
 def read_only_address(path: Path) -> str:
     """Return SQLite's address of a ledger that is only read.
 
-    It wants to make a file beside one in WAL mode: where another person's folder allows none, and
+    SQLite makes a file beside a ledger in WAL mode. Where another person's folder allows none and
     no run is at work, the ledger is read as it stands.
     """
     sibling_path = path.with_name(path.name + "-wal")
@@ -107,10 +105,10 @@ OUTCOME = OUTCOME_COLUMNS.partition(", ")[2]  # all but the position
 
 
 class Ledger:
-    """The run's memory at `path`.
+    """The memory of a run at `path`, with a row for each building of the plan.
 
-    It has a row for each building of the plan, without a status as long as it is to be solved.
-    States of a task: open, running, done, failed (its input cannot be used).
+    A building without a status is still to be solved. States of a task are open, running, done and
+    failed (its input cannot be used).
 
     `losses` counts how often the process died that worked on the task. sqlite3's errors pass
     through.
@@ -247,9 +245,9 @@ class Ledger:
         self.run("update task set state = 'open', losses = losses + 1 where name = ?", name)
 
     def reopen(self) -> None:
-        """Reopen what was running when the main process ended.
+        """Reopen what was running when the main process ended, and count it as lost.
 
-        It was lost with it. Raises sqlite3.DatabaseError for the ledger of another version.
+        Raises sqlite3.DatabaseError for the ledger of another version.
         """
         columns = {name for _, name, *_ in self.run("pragma table_info(building)")}
         if columns != {*Outcome._fields, "tile", "digest"}:
@@ -286,10 +284,7 @@ class Ledger:
         return list(map(Task._make, self.run(sql)))
 
     def counts(self, column: str) -> dict[str, int]:
-        """Count buildings by `column`, most frequent first.
-
-        It is "status", "quality" or "type".
-        """
+        """Count buildings by `column` (status, quality or type), most frequent first."""
         sql = f"select {column}, count(*) from building group by 1 order by 2 desc, 1"
         return {key: number for key, number in self.run(sql) if key is not None}
 

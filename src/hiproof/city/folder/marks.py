@@ -32,18 +32,12 @@ SHOWN_FILES = 3  # of an input that differs: enough to know which delivery was r
 
 
 def describe_inputs(request: Request) -> dict[str, Any]:
-    """Return everything that decides the result of a building, by name.
-
-    These are values, and size and time of the files that they name.
-    """
+    """Return all that decides the result of a building by name: values, and stamps of files."""
     return {"version": __version__} | dict(named_values("", request, "the result"))
 
 
 def describe_selection(request: Request) -> dict[str, Any]:
-    """Return everything that decides which buildings there are.
-
-    It is by name, as from `describe_inputs`.
-    """
+    """Return all that decides which buildings there are, as `describe_inputs` does."""
     return dict(named_values("", request, "which buildings"))
 
 
@@ -77,9 +71,7 @@ def with_files(value: Any) -> Any:
 
 
 def file_stamps(path: Path) -> list[tuple[str, int, int]]:
-    """Return (name, bytes, time in ns) of a file and its companions.
-
-    They are those of the file at `path`, or of a folder's files; there are none if nothing exists.
+    """Return (name, bytes, time in ns) of a file with its companions, or of a folder's files.
 
     The names are those within its folder: what was moved whole is the same.
     """

@@ -1,8 +1,7 @@
-"""A run's own folder.
+"""A run's own folder: opened, compared with the request, and resumed or begun anew.
 
-It is opened, compared with the request, and resumed or begun anew. A building's answer depends on
-the building alone: where its digest is the same, its texts still hold, although footprints,
-overrides, the choice of buildings or the work tiles changed.
+A building's answer depends on the building alone. Where its digest is the same, its texts still
+hold, although footprints, overrides, the choice of buildings or the work tiles changed.
 """
 
 from __future__ import annotations
@@ -39,10 +38,7 @@ LEDGER_BYTES = 200_000  # of an empty one with its journal; where less is free t
 
 
 def open_state(out: Path) -> Path:
-    """Return the run's own folder inside the output folder.
-
-    It is made if need be.
-    """
+    """Return the run's own folder inside the output folder, and make it if need be."""
     state = Path(out) / STATE_FOLDER
     try:
         state.mkdir(parents=True, exist_ok=True)
@@ -216,10 +212,7 @@ def refuse_other_inputs(out: Path, inputs: dict, ledger: Ledger) -> None:
 
 
 def refuse_other_operations(out: Path, plan: WorkPlan) -> None:
-    """Raise OutputError where PROJ transforms coordinates in another way.
-
-    That is another way than when the run was planned.
-    """
+    """Raise OutputError where PROJ transforms coordinates otherwise than when it was planned."""
     from ...read.crs.operations import is_current
 
     changed = [operation for operation in plan.operations if not is_current(operation)]
@@ -232,10 +225,7 @@ def refuse_other_operations(out: Path, plan: WorkPlan) -> None:
 
 
 def stands(out: Path, ledger: Ledger) -> bool:
-    """Return whether a run may resume from what exists.
-
-    It may not where files of a finished run were removed or changed since.
-    """
+    """Return whether the files of a finished run are still as it left them."""
     broken = broken_claims(ledger.claims(), Path(out)) if ledger.get("merged") == "yes" else []
     if broken:
         names = ", ".join(broken[:5]) + (" and others" if len(broken) > 5 else "")
@@ -259,10 +249,7 @@ def keep_edited(out: Path, broken: list[str]) -> str:
 
 
 def remove_unrequested(plan: WorkPlan, out: Path, ledger: Ledger) -> None:
-    """Remove files that an earlier run wrote and this one will not.
-
-    They would pass for its own.
-    """
+    """Remove files of an earlier run that would pass for those of this one."""
     of_formats = {format.file for format in FORMATS.values() if format.fragment}
     requested = {path.name for path in list_requested_files(plan.settings, out).values()}
     for name in {claim.name for claim in ledger.claims()} & of_formats - requested:

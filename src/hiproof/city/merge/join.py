@@ -1,7 +1,6 @@
-"""Joining of the workers' texts into the output files.
+"""Joining of the workers' texts into the output files, in plan order, a tile at a time.
 
-It goes in plan order, with one tile in memory at a time. Size and digest of each file are kept in
-the ledger, and show whether it still stands.
+Size and digest of each file are kept in the ledger, and show whether it still stands.
 """
 
 from __future__ import annotations
@@ -94,10 +93,7 @@ def list_output_files(plan: WorkPlan, out: Path) -> list[Path]:
 
 
 def write_tile(plan: WorkPlan, state: Path, tile: str, places: Iterable[tuple[str, int]]) -> None:
-    """Write the models of a work tile whose texts are at these places.
-
-    That is done where the settings ask for it.
-    """
+    """Write the models of a work tile, whose texts are at `places`, if the settings ask for it."""
     folder = state.parent / TILE_FOLDER
     if files := list_requested_tile_files(plan.settings, folder, tile):
         join_fragments(files, load_texts(state, places), plan.head)

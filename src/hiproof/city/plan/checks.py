@@ -20,10 +20,7 @@ MOST_PROCESSES = 1024  # processes; more is a slip of the hand, and would fill a
 
 
 def refuse_unusable(request: Any) -> None:
-    """Raise SettingsError or InputError for options that cannot be met.
-
-    They are those of a `run.Request`.
-    """
+    """Raise SettingsError or InputError for options of a `run.Request` that cannot be met."""
     processes = request.processes
     if processes is not None and not (type(processes) is int and 1 <= processes <= MOST_PROCESSES):
         raise SettingsError(
@@ -93,10 +90,7 @@ def refuse_missing_packages(request: Any) -> None:
 
 
 def refuse_settings(settings: Settings) -> None:
-    """Raise SettingsError or InputError for values that cannot be used.
-
-    They are well formed.
-    """
+    """Raise SettingsError or InputError for well-formed values that cannot be used."""
     refuse_unknown_types(settings.fit)
     refuse_crs(settings.read)
     refuse_without_network(settings)
@@ -129,10 +123,7 @@ def refuse_unknown_types(fit: Any) -> None:
 
 
 def refuse_crs(read: Any) -> None:
-    """Raise an error unless the CRS given to the clouds can be used.
-
-    It must be known, projected, and of the unit that the settings give.
-    """
+    """Raise SettingsError unless the clouds' CRS is known, projected and in the unit given."""
     from ...read.crs import find_units, parse_crs
 
     try:

@@ -1,7 +1,4 @@
-"""The classes of the clouds that may hold roofs, chosen once for a run.
-
-They are those named, or all where none is a building's.
-"""
+"""The classes of points that may hold roofs: those named, or all where none is a building's."""
 
 from __future__ import annotations
 

@@ -44,10 +44,7 @@ class AreaFrame:
 
     @property
     def crs(self) -> Any:
-        """The CRS of everything written, None where no input names one.
-
-        It is the clouds', else the footprints'.
-        """
+        """The CRS of everything written: the clouds', else the footprints', else None."""
         return self.cloud or self.footprints
 
 
@@ -80,9 +77,7 @@ def settle_frame(request: Any, headers: list[PointFileHeader]) -> AreaFrame:
 
 
 def place_crs(cloud: Any, footprints: Any, path: str, unit: str) -> Any:
-    """Return the CRS of clouds that leave their place open.
-
-    It is the footprints' with the clouds' heights, else the clouds' local one.
+    """Return the footprints' CRS with heights of a cloud that names no place, else its local CRS.
 
     None where they name no plan at all. Raises InputError where the units of clouds and footprints
     differ.
@@ -113,10 +108,7 @@ def place_crs(cloud: Any, footprints: Any, path: str, unit: str) -> Any:
 
 
 def warn_outside_area_of_use(headers: list[PointFileHeader], frame: AreaFrame) -> None:
-    """Warn once where the CRS is not made for the place of the clouds.
-
-    It is another or of another unit then, or its lengths there are not those on the ground.
-    """
+    """Warn once where the CRS is made for another place than the clouds, or stretches it."""
     bounds = plan_bounds(headers)
     if not len(bounds):
         return
@@ -134,10 +126,7 @@ def warn_outside_area_of_use(headers: list[PointFileHeader], frame: AreaFrame) -
 
 
 def plan_bounds(headers: list[PointFileHeader]) -> np.ndarray:
-    """Return boxes (n, 4) of the point files in plan, in their own unit.
-
-    Those without points are left out.
-    """
+    """Return the boxes (n, 4) in plan of the point files that hold points, in their own unit."""
     bounds = list_boxes(headers)
     return bounds[np.isfinite(bounds).all(axis=1)]
 

@@ -1,7 +1,4 @@
-"""The buildings of a run without footprints.
-
-They come from a cloud of roof points, whose class is known or found.
-"""
+"""The buildings of a run without footprints, found among the roof points of a cloud."""
 
 from __future__ import annotations
 
@@ -36,8 +33,8 @@ def jobs_from_cloud(
 ) -> tuple[tuple[Job, ...], Settings]:
     """Return one job a building found, and the settings for its points.
 
-    These choose all points in a cloud of roofs alone. With a box in the request there may be no
-    jobs, and some may lie beside it.
+    The settings choose all points in a cloud of roofs alone. With a box in the request there may be
+    no jobs, and some may lie beside it.
     """
     from ...classify.split import split_buildings
 

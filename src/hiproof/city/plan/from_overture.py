@@ -1,6 +1,6 @@
-"""Footprints of an Overture Maps release for a run's clouds.
+"""Footprints of an Overture Maps release, kept as a GeoPackage and read like any file.
 
-They are kept as a GeoPackage, and read from there like those of any file.
+Overture deletes its old releases, so that what a run was made from is only known where it is kept.
 
 Overture deletes its old releases, so that what a run was made from is only known where it is kept.
 """
@@ -38,10 +38,7 @@ SIDE_PARTS = 16  # of each side of a cloud's box: its sides are curves in longit
 
 
 def with_overture(request: Request, headers: list[PointFileHeader]) -> Request:
-    """Return `request` with footprints that are a file.
-
-    Those of Overture's release are fetched and kept in the run's own folder.
-    """
+    """Return `request` with Overture's footprints fetched and kept in the run's own folder."""
     if not is_overture(request.footprints):
         return request
     path = kept_file(request.out)
@@ -60,9 +57,7 @@ def choose_footprints(request: Request) -> str | None:
 
 
 def keep_footprints(request: Request, headers: list[PointFileHeader], path: Path) -> dict[str, Any]:
-    """Write the footprints of Overture's release to a GeoPackage.
-
-    They are those in the clouds' extent.
+    """Write the footprints of Overture's release in the clouds' extent to a GeoPackage.
 
     The layer of `request` names one of Overture's types. Returns where they come from. Raises
     SettingsError for another layer, InputError for clouds without a CRS and where the release
@@ -86,9 +81,7 @@ def keep_footprints(request: Request, headers: list[PointFileHeader], path: Path
 
 
 def compute_extent(request: Request, headers: list[PointFileHeader]) -> shapely.Geometry:
-    """Return the boxes of the point files in longitude and latitude.
-
-    They are one geometry.
+    """Return the boxes of the point files in longitude and latitude as one geometry.
 
     Raises InputError where no file names a CRS, and for an extent across the 180th meridian.
     """
@@ -139,10 +132,7 @@ def write_geopackage(fetched: OvertureFootprints, path: Path) -> None:
 
 
 def read_source(path: str | None) -> dict[str, Any] | None:
-    """Return the source of a GeoPackage's footprints, None if it names none.
-
-    It is None too where there is no file.
-    """
+    """Return the source of a GeoPackage's footprints, None if there is none or no file."""
     if not path or not path.endswith(".gpkg") or not Path(path).is_file():
         return None
     import pyogrio

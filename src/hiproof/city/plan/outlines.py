@@ -27,10 +27,7 @@ shift of all footprints alone.
 
 
 class Outlines:
-    """Plan polygons in world metres.
-
-    Those of a run's buildings come first, by their number, then those of others around.
-    """
+    """Plan polygons in world metres: those of a run's buildings by number, then others around."""
 
     def __init__(self, polygons: list[shapely.Polygon]):
         self.polygons = np.array(polygons, object)
@@ -49,10 +46,7 @@ class Outlines:
 
     @functools.cached_property
     def boxes(self) -> np.ndarray:
-        """Boxes (n, 4) of what each outline is moved with.
-
-        That is its row, or itself where the row is too long.
-        """
+        """Boxes (n, 4) of each outline's row, or of the outline where the row is too long."""
         bounds, labels = shapely.bounds(self.polygons), self.labels
         lower = np.full((labels.max(initial=0) + 1, 2), np.inf)
         upper = np.full((labels.max(initial=0) + 1, 2), -np.inf)
@@ -73,10 +67,7 @@ class Outlines:
         return sorted(self.polygons[near[near != index]], key=shapely.to_wkb)
 
     def row(self, index: int) -> list[shapely.Polygon]:
-        """Return the outlines of the row of outline `index`, itself among them.
-
-        They have an order of their own; there are none of too long a row.
-        """
+        """Return the outlines of the row of outline `index`, sorted, or none of too long a row."""
         label = int(self.labels[index])
         if label not in self.rows:
             row = self.polygons[self.members[label]]

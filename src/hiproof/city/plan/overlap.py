@@ -29,10 +29,10 @@ def check_overlap(
     cloud_crs: CRS | None = None,
     units: Units = METRES,
 ) -> None:
-    """Raise InputError when no footprint meets the cloud's `bounds`.
+    """Raise InputError when no footprint meets the boxes (n, 4) of the cloud's files, `bounds`.
 
-    These are the boxes (n, 4) of its files, and all are in world metres. The CRSs are those that
-    the two sides name, `units` those of the CRS they are in; the message says what they look like.
+    All are in world metres. The CRSs are those that the two sides name, and `units` those of the
+    CRS they are in. The message says what they look like.
     """
     boxes = shapely.bounds(
         [footprint.polygon for footprint in footprints if not footprint.polygon.is_empty]
@@ -133,10 +133,7 @@ def neighbours(crs: CRS | None) -> Iterator[CRS]:
 
 
 def utm_zones(lon_lat: np.ndarray) -> Iterator[CRS]:
-    """Yield the UTM zones in which positions in degrees (n, 2) lie.
-
-    They are Europe's, North America's and the world's.
-    """
+    """Yield the UTM zones (Europe, North America, world) of positions in degrees (n, 2)."""
     lon, lat = np.median(lon_lat, axis=0)
     if np.isfinite((lon, lat)).all():
         zone = int((lon + 180) // 6) % 60 + 1

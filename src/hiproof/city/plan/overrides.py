@@ -54,10 +54,7 @@ def keep_overrides(path: str | None, plan: WorkPlan, state: Path) -> dict[int, d
 
 
 def read_overrides(path: str) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield (id, record) of every override in a JSONL file or a table.
-
-    Those of a parameters.jsonl are lists of parts.
-    """
+    """Yield (id, record) of every override in a table, a JSONL file or a parameters.jsonl."""
     visited: dict[str, dict[str, Any]] = {}
     for where, record in override_records(path):
         try:
@@ -111,10 +108,7 @@ def table_records(path: str) -> list[dict[str, Any]]:
 def match_overrides(
     records: dict[str, dict[str, Any]], plan: WorkPlan
 ) -> dict[int, dict[str, Any]]:
-    """Return the overrides by the number of their building.
-
-    Those that columns of the footprints hold are among them; unknown ones are reported.
-    """
+    """Return overrides, those of footprints' columns too, by building, and report unknown ones."""
     names, result, remainder = pair_columns(plan), {}, dict(records)
     impossible = SkippedValues("columns of the footprints")
     for job in plan.jobs:
@@ -200,10 +194,7 @@ def refuse_others(names: list[str], allowed: Sequence[str], subject: str) -> Non
 def column_override(
     job: Job, names: list[tuple[str, str]], impossible: SkippedValues
 ) -> dict[str, Any]:
-    """Return the override in the columns of a building's footprint.
-
-    It is empty where they hold nothing; impossible values are noted.
-    """
+    """Return the override in a footprint's columns, perhaps empty; note impossible values."""
     attributes = job.footprint.attributes if job.footprint else {}
     result = select_possible(
         {key: attributes[name] for name, key in names if name in attributes}, job.id, impossible

@@ -27,9 +27,9 @@ def add_passages(
 ) -> tuple[Footprint, ...]:
     """Return the footprints, each with the passages below it.
 
-    They are those of the layer `underpasses` of the request, and of a column of the footprints: a
-    building with a number there stands so high above the ground. Raises InputError for a layer that
-    cannot be read, and for columns that are not there.
+    Passages come from the layer `underpasses` of the request, and from a column of the footprints:
+    a building with a number there stands so high above the ground. Raises InputError for a layer
+    that cannot be read, and for columns that are not there.
     """
     column = request.settings.read.raised_column
     if column:

@@ -104,10 +104,7 @@ def make_plan(request: Request, progress: Progress = lambda *_: None) -> WorkPla
 
 
 def warn_files_elsewhere(jobs: tuple[Job, ...], crs: Any, units: FileUnits) -> None:
-    """Warn once where the files' CRS is made for another place.
-
-    That is another place than that of the buildings.
-    """
+    """Warn once where the files' CRS is made for another place than that of the buildings."""
     boxes = shapely.bounds([job.area for job in jobs])
     corners = units.gml.from_metres(boxes[np.isfinite(boxes).all(axis=1)].reshape(-1, 2))
     doubt = doubtful_place(crs, corners) if len(corners) else None
@@ -214,10 +211,7 @@ def jobs_from_footprints(
 def select_neighbours(
     footprints: tuple[Footprint, ...], data_set: tuple[Footprint, ...]
 ) -> list[Footprint]:
-    """Return those of a data set near the requested footprints.
-
-    These themselves are left out.
-    """
+    """Return those of a data set near the requested footprints, without these themselves."""
     if data_set is footprints:
         return []
     polygons_requested = np.array([f.polygon for f in footprints if not f.polygon.is_empty])
@@ -276,9 +270,9 @@ def list_operations(
     jobs: tuple[Job, ...],
     is_told: bool = False,
 ) -> list[Operation]:
-    """Return the operation between two CRSs in plan, at the buildings.
+    """Return the operation between two CRSs in plan at the buildings, and warn if it is coarse.
 
-    There is none where both are the same or one is unknown. A warning says where it is coarse.
+    The list is empty where both CRSs are the same or one is unknown.
     """
     areas = np.array([job.area for job in jobs if not job.area.is_empty])
     if (
@@ -299,10 +293,7 @@ def list_operations(
 
 
 def say_if_columns_run_out(path: str, footprints: tuple[Footprint, ...]) -> None:
-    """Warn before any work of more attributes than a GeoPackage has columns.
-
-    They are the footprints'.
-    """
+    """Warn before any work of more attributes of footprints than a GeoPackage has columns."""
     count = len({name for footprint in footprints for name in footprint.attributes})
     if count > (room := attributes_with_a_column()):
         warn(
@@ -328,10 +319,7 @@ def jobs_in_box(jobs: tuple[Job, ...], request: Request, units: Units) -> tuple[
 
 
 def refuse_box_elsewhere(bbox: Box | None, bounds: np.ndarray) -> None:
-    """Refuse a box that meets none of the clouds' boxes (n, 4).
-
-    Both are in the clouds' own unit. It is refused before anything is read.
-    """
+    """Refuse a box that meets none of the clouds' boxes (n, 4), both in the clouds' own unit."""
     if (
         bbox is None
         or not len(bounds)

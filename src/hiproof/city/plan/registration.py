@@ -1,6 +1,4 @@
-"""The common shift of a run's footprints onto its roofs.
-
-It is estimated before there are work tiles.
+"""The common shift of a run's footprints onto its roofs, estimated before there are tiles.
 
 The data set is all footprints of the file within the clouds, whichever of them --where or --bbox
 choose, and the roof points in a sample of its squares of CELL_M. The sample follows from the places

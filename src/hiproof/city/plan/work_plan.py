@@ -1,7 +1,4 @@
-"""The plan of a run.
-
-It has the requested buildings, the work tile that owns each, and the point files.
-"""
+"""The plan of a run: requested buildings, the work tile that owns each, and point files."""
 
 from __future__ import annotations
 
@@ -91,18 +88,12 @@ class WorkPlan:
 
     @property
     def terrain_reach_m(self) -> float:
-        """How far around a building terrain matters.
-
-        It is farther where the ground must be found first.
-        """
+        """How far around a building terrain matters, farther where the ground must be found."""
         return FOUND_GROUND_REACH_M if self.settings.read.roofs == "shape" else GROUND_REACH_M
 
     @functools.cached_property
     def around_m(self) -> float:
-        """How far beyond its area a building sees roof points.
-
-        Those of neighbours show where its own roof ends.
-        """
+        """How far beyond its area a building sees roof points, which show where its roof ends."""
         sees = self.settings.read.by_class and any(job.footprint is not None for job in self.jobs)
         return AROUND_M if sees else 0.0
 
@@ -147,7 +138,7 @@ class WorkPlan:
         return find_units(self.crs(), unit_name=self.settings.read.unit)
 
     def crs(self) -> Any:
-        """Return the output's reference system, None where no input names one.
+        """The output's reference system, None where no input names one.
 
         It is made by its code where that is complete, so that also its plan alone has one.
         """
@@ -217,10 +208,9 @@ class WorkPlan:
 
 
 def read_job(index: int, row: list, area: shapely.Polygon, shift: tuple[float, float]) -> Job:
-    """Read a building of the plan's file.
+    """Read a building of the plan's file: [id, area, attributes, error, passage, ...].
 
-    It is [id, area, attributes, error, passage, ...], without attributes if there is no footprint.
-    A passage is [polygon, clearance].
+    Attributes are None without a footprint. A passage is [polygon, clearance].
     """
     id, _, attributes, error, *rows = row
     passages = tuple((shapely.from_wkb(wkb), clearance) for wkb, clearance in rows)
@@ -254,10 +244,7 @@ def loaded_plan(path: Path, stamp: int) -> WorkPlan:
 
 
 def unusual_names(jobs: tuple[Job, ...]) -> dict[int, tuple[str, str]]:
-    """Return names in CityJSON and CityGML of some jobs.
-
-    They are those that cannot go by their own id there, or whose ids would meet.
-    """
+    """Return CityJSON and CityGML names of jobs whose own ids cannot stand there or would meet."""
     json_names, gml_names, unusual = UniqueNames(), UniqueNames(), {}
     for job in jobs:
         pair = json_names.take(plain_text(job.id)), gml_names.take(gml_name(job.id))
@@ -267,10 +254,7 @@ def unusual_names(jobs: tuple[Job, ...]) -> dict[int, tuple[str, str]]:
 
 
 def choose_file_offset(jobs: tuple[Job, ...], units: Units) -> np.ndarray:
-    """Return the CityJSON file's offset (3,), by the first area.
-
-    It is in the file's `units`.
-    """
+    """Return the CityJSON file's offset (3,), in its `units`, by the first area."""
     corners = (units.from_metres(job.area.bounds[:2]) for job in jobs if not job.area.is_empty)
     return next(map(choose_offset, corners), np.zeros(3))
 
@@ -297,10 +281,7 @@ def cut_into_tiles(jobs: tuple[Job, ...], tile_m: float, limit: int) -> dict[str
 def make_jobs(
     footprints: tuple[Footprint, ...], shift: tuple[float, float] = (0.0, 0.0)
 ) -> tuple[Job, ...]:
-    """Return one job a footprint, in the order of the file.
-
-    All lie `shift` beside their roofs.
-    """
+    """Return one job a footprint in the order of the file, all `shift` beside their roofs."""
     if not footprints:
         raise InputError(
             "expected at least one polygon in the footprints, got none; check the file and its "
@@ -310,9 +291,7 @@ def make_jobs(
 
 
 def neighbourhood(job: Job, reach_m: float) -> np.ndarray:
-    """Return the box around a job's area in which terrain points matter.
-
-    It is (xmin, ymin, xmax, ymax), on whole metres of the world.
+    """Return the whole-metre box (xmin, ymin, xmax, ymax) in which terrain matters to a job.
 
     Whole metres keep the terrain cells of a building the same whatever tile it is computed in.
     """

@@ -1,7 +1,4 @@
-"""The folders of bundles: their names, and which of them stay.
-
-They are apart from what is in them (bundles.py), which a run needs only where a building failed.
-"""
+"""The folders of bundles, without what is in them, which only failures need (bundles.py)."""
 
 from __future__ import annotations
 

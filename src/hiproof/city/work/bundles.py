@@ -186,10 +186,7 @@ def crop_points(points: dict[str, np.ndarray], plan: WorkPlan, job: Job) -> dict
 
 
 def write_points(path: Path, points: dict[str, np.ndarray]) -> None:
-    """Write points (n, 3) by kind as a LAZ file with exact coordinates.
-
-    They come in addition to those of the format.
-    """
+    """Write points (n, 3) by kind as LAZ, with exact coordinates beside those of the format."""
     import laspy
 
     xyz = np.concatenate(list(points.values()))

@@ -62,10 +62,7 @@ def has_semaphores() -> bool:
 
 @contextmanager
 def limit_threads() -> Iterator[None]:
-    """Let processes started in here do linear algebra in one thread.
-
-    There are as many of them as cores. What the user set stays.
-    """
+    """Let processes started in here use one thread for linear algebra, unless the user set it."""
     own_names = [name for name in THREADS if name not in os.environ]
     os.environ.update(dict.fromkeys(own_names, "1"))
     try:

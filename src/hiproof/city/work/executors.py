@@ -1,6 +1,4 @@
-"""Executors: where tasks run.
-
-It is this process, processes of this machine (processes.py), or a Dask cluster.
+"""Executors, where tasks run: this process, processes of this machine, or a Dask cluster.
 
 One verb: `run`.
 

@@ -1,6 +1,4 @@
-"""The ground around the buildings of a work tile.
-
-It comes from one grid of whole-metre cells for all of them.
+"""The ground around the buildings of a work tile, from one grid of whole-metre cells.
 
 A cell's height depends on the points in it alone, and a building asks only the cells of its own
 whole-metre box. So the answer is the same whatever tile the cells were gathered for, and costs a
@@ -38,10 +36,7 @@ LEVELLING = 0.1  # m2: holds the slope back where cells lie on one side only
 
 
 class Cells:
-    """Known cells as dense tables `x`, `y`, `z` (rows, columns).
-
-    They are world metres, NaN where no point is.
-    """
+    """Known cells in world metres as tables `x`, `y`, `z` (rows, columns), NaN without a point."""
 
     def __init__(self, xyz: np.ndarray):
         """Make tables of `xyz` (n, 3), at most one point a cell."""
@@ -69,10 +64,7 @@ class Cells:
         )
 
     def select_around(self, xy: np.ndarray, reach: int, box: np.ndarray) -> np.ndarray:
-        """Return the cells (n, k, 3) up to `reach` from each of `xy` (n, 2), inside a box.
-
-        They are NaN where no point is, and outside the box.
-        """
+        """Return cells (n, k, 3) of a box within `reach` of `xy` (n, 2), NaN where no point is."""
         size = self.z.shape[::-1]
         steps = np.arange(-reach, reach + 1)
         lower = np.maximum(box[:2].astype(np.int64) - self.low, 0)
@@ -102,10 +94,7 @@ class GroundAround:
     source = "ground points"
 
     def height_at(self, xy_world: np.ndarray) -> np.ndarray:
-        """Return the height (n,) at `xy_world` (n, 2).
-
-        It is NaN where no cell within the last ring is known.
-        """
+        """Return heights (n,) at `xy_world` (n, 2), NaN where the last ring holds no cell."""
         xy = np.asarray(xy_world, float)[:, :2]
         heights, missing = np.full(len(xy), np.nan), np.arange(len(xy))
         for reach in RINGS:
@@ -146,10 +135,7 @@ class ModelAround:
 
 @dataclass
 class BareAround:
-    """Terrain for one building where no class marks the ground.
-
-    It is the lowest cells, without what stands on it. They are looked for when first asked for.
-    """
+    """Terrain for one building where no class marks the ground: its lowest cells."""
 
     find_cells: Callable[[], Cells]
     box: np.ndarray
@@ -165,10 +151,7 @@ class BareAround:
         return GroundAround(Cells(bare_points(lowest) if len(lowest) else lowest), self.box)
 
     def height_at(self, xy_world: np.ndarray) -> np.ndarray:
-        """Return the height (n,) at `xy_world` (n, 2).
-
-        It is NaN where no ground is found within the last ring.
-        """
+        """Return heights (n,) at `xy_world` (n, 2), NaN where the last ring holds no ground."""
         return self.bare.height_at(xy_world)
 
 
@@ -275,21 +258,18 @@ class WhereLikeGround:
         self.model, self.ground, self.source = model, ground, model.source
 
     def height_at(self, xy_world: np.ndarray) -> np.ndarray:
-        """Return the model's height (n,) at `xy_world` (n, 2).
-
-        It is NaN where it has none or contradicts the ground points.
-        """
+        """Return the model's heights (n,), NaN where it has none or contradicts ground points."""
         heights = self.model.height_at(xy_world)
         gap = np.abs(heights - self.ground.height_at(xy_world))
         return np.where(gap > OTHER_GROUND_M, np.nan, heights)
 
 
 def check_terrain(model: TerrainModel, ground: Terrain, xy: np.ndarray) -> str:
-    """Return a remark where the terrain model has no true height.
+    """Return a remark where the terrain model has no true height, else an empty one.
 
     It has none at some of the corners `xy` (n, 2) of an outline, or lies far above or below the
-    ground points there, or rises from them at the outline alone. Where there are none its own
-    heights beside the outline count. The remark is empty otherwise.
+    ground points there, or rises from them at the outline alone. Without ground points its own
+    heights beside the outline count.
     """
     coded = model.is_coded_at(xy)
     if coded.any():
@@ -321,7 +301,7 @@ def check_terrain(model: TerrainModel, ground: Terrain, xy: np.ndarray) -> str:
 def measure_step(find_heights: Callable[[np.ndarray], np.ndarray], xy: np.ndarray) -> float:
     """Return by how much (m) heights rise or fall at the corners `xy` (n, 2) of an outline.
 
-    It is 0 where a plane beside them explains it.
+    The step is 0 where a plane beside the corners explains it.
     """
     away = xy - xy.mean(axis=0)
     away /= np.maximum(np.hypot(*away.T), 1.0)[:, None]

@@ -35,10 +35,7 @@ def save_run_boxes(path: Path, boxes: list[np.ndarray], points: int) -> None:
 
 
 def load_run_boxes(path: Path, points: int) -> RunIndex | None:
-    """Load the note of a file that has so many `points`.
-
-    It is None where there is nothing usable.
-    """
+    """Load the note of a file that has so many `points`, None without a usable one."""
     try:
         with np.load(path, allow_pickle=False) as arrays:
             boxes, noted_points = arrays["boxes"], int(arrays["points"])

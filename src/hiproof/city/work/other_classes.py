@@ -1,6 +1,4 @@
-"""The evidence of points that are not of the building's class.
-
-They tell why a building has none of that class, or whether it stood there whenever it was scanned.
+"""What points of other classes show: why a building has none of its own, or whether it stood.
 
 All is told in whole-metre cells, as the ground and the lowest of the other points are kept of a
 work tile.
@@ -35,8 +33,8 @@ UNDER_ROOF = 0.4
 class OtherPoints:
     """What lies inside a building's `area` beside the points of its class.
 
-    It is of each cell the ground (m, 3) and the lowest of the other points, where these lie `high`
-    above it (n, 3) or `low`, on it (l, 3).
+    Of each cell it holds the ground (m, 3), and the lowest other point where that lies `high` above
+    it (n, 3) or `low`, on it (l, 3).
     """
 
     area: shapely.Geometry
@@ -62,10 +60,7 @@ class OtherPoints:
 
 
 def find_bare_cells(points: OtherPoints) -> np.ndarray:
-    """Return the ground points (k, 3) under which nothing else lies high.
-
-    There are no leaves and no roof without a class in their cells.
-    """
+    """Return ground points (k, 3) in cells without leaves or roofs of another class."""
     if not len(points.high):
         return points.ground
     return points.ground[~np.isin(cell_numbers(points.ground), list_cells(points.high))]
@@ -85,10 +80,7 @@ def find_low_cells(points: OtherPoints, covered: np.ndarray) -> np.ndarray:
 
 
 def explain_missing_points(points: OtherPoints, classes: Sequence[int]) -> str:
-    """Return the detail of a building without points of its `classes`.
-
-    It is empty where nothing else was seen either.
-    """
+    """Return a detail, perhaps empty, of a building without points of its `classes`."""
     bare = list_cells(points.ground)
     share = points.share(np.setdiff1d(list_cells(points.high), bare))
     share_bare = points.share(bare)
@@ -105,10 +97,10 @@ def explain_missing_points(points: OtherPoints, classes: Sequence[int]) -> str:
 
 
 def remark_other_classes(points: OtherPoints, roof: np.ndarray) -> str:
-    """Return a remark where only points of other classes lie high.
+    """Return a remark where only points of other classes lie high, else an empty one.
 
-    They do so over much of a building, in cells without `roof` points (n, 3) and without ground. It
-    is empty otherwise.
+    They have to do so over much of a building, in cells without `roof` points (n, 3) and without
+    ground.
     """
     if not is_much(points.high, points):  # a point a cell: most buildings need no further look
         return ""
@@ -123,10 +115,7 @@ def remark_other_classes(points: OtherPoints, roof: np.ndarray) -> str:
 
 
 def is_much(cells: np.ndarray, points: OtherPoints) -> bool:
-    """Return whether so many cells (n, ...) are more than chance.
-
-    They have to be more than a small share of the area too.
-    """
+    """Return whether so many cells (n, ...) exceed chance and a small share of the area."""
     return len(cells) >= FEWEST_CELLS and points.share(cells) > HALF_CLASSIFIED
 
 

@@ -139,10 +139,10 @@ def start_deaf() -> Iterator[None]:
 
 
 def begin_worker(heard: Connection, logging: tuple, count: Any) -> None:
-    """Set up a worker process.
+    """Set up a worker process, which logs as the main process does and ends with it.
 
-    It logs as the main process does and counts buildings in memory that both share. It ends when
-    the main process closes the pipe, or is gone: a kill -9 of that leaves nothing running.
+    It counts buildings in memory that both share. It ends when the main process closes the pipe, or
+    is gone: a kill -9 of that leaves nothing running.
 
     That compiled code cannot be kept, the main process has said.
     """

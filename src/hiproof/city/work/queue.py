@@ -30,10 +30,7 @@ TRIES = 3
 
 
 def run_isolated(single: Any, function: Callable, task: tuple) -> tuple[Any, Exception | None]:
-    """Return (result, error) of `function(*task)` in an isolated executor.
-
-    It is tried again when its process dies.
-    """
+    """Return (result, error) of `function(*task)` run alone, tried again if its process dies."""
     for _ in range(TRIES):
         ((_, result, error),) = single.run(function, [task])
         if not is_loss(error):

@@ -39,9 +39,7 @@ def solve_bundle(folder: Path, out: Path) -> tuple[Building, str]:
 
 
 def search_again(plan: WorkPlan, points: dict[str, np.ndarray]) -> WorkPlan:
-    """Search again for buildings in the area where the search failed.
-
-    It is the area of the plan's building.
+    """Search for buildings again in the area where the search of a bundle failed.
 
     `points` (n, 3) by kind are those of the bundle.
     """

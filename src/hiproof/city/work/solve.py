@@ -80,10 +80,7 @@ DIED = "the process died while it worked on this building"
 
 
 class Surroundings:
-    """All points of a work tile, and its terrain model if there is one.
-
-    They are looked up building by building.
-    """
+    """All points of a work tile and its terrain model, looked up building by building."""
 
     def __init__(self, points: dict[str, np.ndarray], model: TerrainModel | None, plan: WorkPlan):
         self.roof, self.noise, self.plan = points["roof"], points["noise"], plan
@@ -210,10 +207,9 @@ class Surroundings:
         return [shapely.transform(polygon, lambda xy: xy + shift) for polygon in near]
 
     def select_noise(self, job: Job, roof: np.ndarray) -> np.ndarray:
-        """Return noise points (m, 3) over the job's area that lie high.
+        """Return noise points (m, 3) over the job's area, higher than half of its `roof` (n, 3).
 
-        They lie higher than half of its `roof` points (n, 3): where they are many they are a spire,
-        not birds.
+        Where they are many, they are a spire and not birds.
         """
         if job.area.is_empty or not len(roof) or not len(self.noise):
             return np.zeros((0, 3))
@@ -221,10 +217,7 @@ class Surroundings:
         return without_repeats(noise[noise[:, 2] > np.median(roof[:, 2])])
 
     def select_points(self, job: Job, reach_m: float) -> np.ndarray:
-        """Return points (n, 3) that may be roofs around a building, each once.
-
-        They lie in the whole-metre box that reaches so far.
-        """
+        """Return points (n, 3), each once, that may be roofs in the box around a job."""
         lower, upper = neighbourhood(job, reach_m).reshape(2, 2)
         nearby = self.roof[self.grid.candidates((*lower, *upper))]
         return without_repeats(
@@ -251,10 +244,7 @@ class Surroundings:
         return self.list_terrains(job)[:-1]
 
     def list_terrains(self, job: Job) -> list[Terrain]:
-        """Return the terrains of a building, the best first and its lowest points last.
-
-        They are those in the whole-metre box around it.
-        """
+        """Return terrains in the box around a building, best first and its lowest points last."""
         box = neighbourhood(job, self.plan.terrain_reach_m)
         find_low = functools.cache(lambda: self.find_lowest(job, box))  # most have better ground
         points = GroundAround(self.ground, box)
@@ -282,10 +272,7 @@ class Surroundings:
         return None if job.area.is_empty else TerrainChain(self.list_terrains(job))
 
     def remark_terrain(self, job: Job) -> str:
-        """Return a remark where the terrain model contradicts ground points.
-
-        They lie around a building. It is empty otherwise.
-        """
+        """Return a remark, perhaps empty, where ground points contradict the terrain model."""
         if self.model is None or job.area.is_empty:
             return ""
         box = neighbourhood(job, self.plan.terrain_reach_m)
@@ -307,8 +294,8 @@ class Surroundings:
     def bare(self, job: Job, result: FoundRoof, neighbours: OtherPoints | None) -> np.ndarray:
         """Return points (n, 3) of bare ground inside the building's area.
 
-        They are of the ground class where nothing of another class stands over them, or were told
-        from the roof by their height.
+        They are of the ground class with nothing of another class over them, or were told from the
+        roof by their height.
         """
         if job.area.is_empty or job.footprint is None:
             return result.ground
@@ -318,9 +305,7 @@ class Surroundings:
         return np.concatenate([result.ground, classified])
 
     def inspect(self, building: Building, points: OtherPoints | None, roof: np.ndarray) -> Building:
-        """Return the building with the remarks of other classes' points.
-
-        They are made where classes mark roofs.
+        """Return the building with remarks of other classes, where classes mark roofs.
 
         `roof` (n, 3) are its own.
         """
@@ -341,9 +326,7 @@ class Surroundings:
 def solve_tile(
     folder: str, tile: str, terrain: str | None = None, avoid: tuple[int, ...] = ()
 ) -> list[Outcome]:
-    """Reconstruct all buildings of `tile`, and write its part file.
-
-    They stand on the terrain model `terrain`.
+    """Reconstruct all buildings of `tile` on the model `terrain`, and write its part file.
 
     `avoid` are the buildings that killed their worker before: they become internal errors without
     being tried again. Returns a row a building for the ledger.
@@ -472,10 +455,7 @@ def solve_safely(
 
 @contextmanager
 def pass_over_failure(job: Job) -> Iterator[None]:
-    """Pass over an error of a building in what precedes its solution.
-
-    It is logged. Errors that `solve_safely` raises are raised here, too.
-    """
+    """Log an error in what precedes a building's solution; raise those of `solve_safely`."""
     try:
         yield
     except DamagedRaster:

@@ -47,10 +47,7 @@ QUERY_M = 500.0  # side of the boxes in which an indexed file is asked for its p
 
 @dataclass(frozen=True)
 class Reach:
-    """The boxes in which points of a tile's buildings may lie.
-
-    They are whole-metre boxes (m, 4) of the areas and of their surroundings.
-    """
+    """The whole-metre boxes (m, 4) in which points of a tile's buildings may lie."""
 
     roof_boxes: np.ndarray
     terrain_boxes: np.ndarray
@@ -75,10 +72,7 @@ class Reach:
         return mask
 
     def bits(self, xy: np.ndarray, index: np.ndarray) -> np.ndarray:
-        """Return the mask (k,) at the points `xy[index]` of (n, 2 or more).
-
-        It is 0 outside the bounds; boxes exclude upper sides.
-        """
+        """Return the mask (k,) at points `xy[index]`, 0 outside the bounds and on upper sides."""
         column, row = np.floor(xy[index, :2] - self.bounds[:2]).astype(np.int64).T
         columns, rows = self.mask.shape
         is_on = (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
@@ -86,9 +80,7 @@ class Reach:
 
 
 class Reaches:
-    """The reach of every work tile that needs points, found by place.
-
-    It is made once a process.
+    """The reach of every work tile that needs points, by place, made once a process.
 
     Where `only` names tiles, and of each the buildings that points are wanted for, it is the reach
     of these alone.
@@ -136,10 +128,7 @@ def load_reaches(root: Path, stamp: int) -> Reaches:
 
 
 class Gatherer:
-    """A collector of one file's points by work tile.
-
-    It writes them to `folder`, as often as memory asks for it.
-    """
+    """A collector of a file's points by tile, written to `folder` as often as memory asks."""
 
     def __init__(self, reaches: Reaches, read: ReadSettings, folder: Path, number: int):
         self.folder, self.number, self.read = folder, number, read
@@ -257,9 +246,9 @@ def wanted_points(
 ) -> Iterator[PointCloud]:
     """Yield the chunks of a file in `units` that may be needed.
 
-    They are all of its chunks; unless it `is_whole`, of a file with a spatial index, or with the
-    places of its points in the file `noted`, only what holds buildings' surroundings. Where it is
-    read from end to end, `result` gets these places (noted.py).
+    All chunks are, unless the file has a spatial index, or the places of its points are in the file
+    `noted`: then only those around buildings, if it is not `is_whole`. Where it is read from end to
+    end, `result` gets these places (noted.py).
     """
     if file_kind(path) != "las":
         return iter_points(path, units=units)
@@ -280,9 +269,7 @@ def wanted_points(
 
 
 def points_by_squares(path: str, reaches: Reaches, units: Units) -> Iterator[PointCloud]:
-    """Yield a COPC file's points around buildings.
-
-    They lie in the boxes that hold buildings' surroundings.
+    """Yield a COPC file's points in the boxes around buildings.
 
     The boxes are squares of QUERY_M, so that memory stays bounded; of the octree only nodes at
     their common borders are decoded twice. A point on a border may come twice, as in files that
@@ -311,11 +298,7 @@ def points_by_squares(path: str, reaches: Reaches, units: Units) -> Iterator[Poi
 
 
 def load_points(root: Path, tile: str, epoch: str = "") -> dict[str, np.ndarray]:
-    """Load the points (n, 3) of a work tile from all files, by kind.
-
-    They are those of an `epoch`, where the run has several. Kinds are "roof", "ground", "low" and
-    "noise".
-    """
+    """Load points (n, 3) of a tile, or of an `epoch`, as "roof", "ground", "low" and "noise"."""
     # a name that starts with a dot is what a killed worker left unfinished
     return load_files(sorted((root / "points" / epoch / tile).glob("[!.]*.npz")))
 

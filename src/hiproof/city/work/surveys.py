@@ -1,7 +1,4 @@
-"""The points of several surveys in a work tile.
-
-Those of a building are those of the surveys of which its model is made.
-"""
+"""The points of a building in a work tile, of the surveys of which its model is made."""
 
 from __future__ import annotations
 
@@ -58,10 +55,7 @@ class SurveyPoints:
         return self.views[names]
 
     def choose(self, record: Mapping[str, Any]) -> Surroundings:
-        """Return the points of which the model of an object of parameters.jsonl is made.
-
-        They are those of the newest survey where it names none of them.
-        """
+        """Return the points of the surveys that a building's object names, or of the newest."""
         used = record.get("epochs_used") or ()
         names = tuple(name for name in self.points if name in used)
         return self.unite(names or tuple(self.points)[:1])

@@ -121,10 +121,7 @@ def compile_half(half: str) -> None:
 
 
 def make_hall() -> np.ndarray:
-    """Return the points (n, 3) of a level roof with boxes in a row, which are copies.
-
-    They are more than the search takes.
-    """
+    """Return more points (n, 3) than the search takes, of a level roof with a row of boxes."""
     x, y = (axis.ravel() for axis in np.mgrid[0.2:60.0:0.4, 0.2:6.0:0.4])
     return np.column_stack([x, y, np.where((x % 5 < 2) & (y % 5 < 2), 6.0, 5.0)])
 
