@@ -253,11 +253,13 @@ def find_fresh(
     `roofs` (k, 5) are the cells of one survey, `other` those of the other one. A roof beside a
     building extends it where `names` of the buildings are known.
     """
-    known, is_beside = find_keys(other["roof"]), touches(other["roof"], outlines, BESIDE_M)
+    known = find_keys(other["roof"])
     points = roofs[~np.isin(find_keys(roofs), known)]
     points = points[~touches(points, outlines, 0.0)]
     around = find_keys(points)[:, None] + AROUND_KEYS
-    near = touches(points, outlines, BESIDE_M) | np.isin(around, known[~is_beside]).any(axis=1)
+    away = other["roof"][np.isin(known, around)]
+    away = find_keys(away[~touches(away, outlines, BESIDE_M)])
+    near = touches(points, outlines, BESIDE_M) | np.isin(around, away).any(axis=1)
     on_ground = np.isin(find_keys(points), find_keys(other["ground"]))
     filled = predict_occupancy(roofs[:, 4])
     found = describe_roofs(points, filled, ~near, on_ground, other["ground"], outlines, kind)

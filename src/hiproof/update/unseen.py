@@ -65,9 +65,12 @@ def draw_unseen(roof: Roof, comparison: CellComparison) -> shapely.Geometry | No
     from scipy.spatial import KDTree
 
     tree, places = KDTree(xy), (cells + 0.5) * PART_GRID_M
+    distance = np.where(is_known, tree.query(places)[0], 0.0)
+    if distance.max() <= REACH_M:
+        return None
     spacing = float(np.median(tree.query(xy, [min(NEIGHBOURS, len(xy))])[0]))
     reach = max(REACH_M, OVER_NEIGHBOURS * spacing, c.cell_m)
-    core = places[is_known & (tree.query(places)[0] > reach)]
+    core = places[distance > reach]
     if not len(core):
         return None
     members = cells[KDTree(core).query(places)[0] <= reach]
