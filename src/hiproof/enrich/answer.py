@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import shapely
 
+from ..compose.settle import round_number
 from ..model import ROOF, Building, Solid
 from ..model.roof_figures import (
     LEVEL_RIDGE_M,
@@ -22,7 +23,7 @@ from ..model.roof_figures import (
     roof_figures,
 )
 from ..write.attribute_list import OWN
-from ..write.values import plain_text, round_value
+from ..write.values import plain_text
 from .cadastre import Cadastre
 from .cut import Region, cut_walls
 from .party import Contact, Town
@@ -230,8 +231,8 @@ def answer(
     )
     areas = measure_areas(building.solid, float(party_m2))
     attributes = {
-        **{OWN + name: round_value(area, 4) for name, area in areas.items()},
-        **{name: round_value(areas[own], 4) for own, name in OF_3DBAG.items()},
+        **{OWN + name: round_number(area, 4) for name, area in areas.items()},
+        **{name: round_number(areas[own], 4) for own, name in OF_3DBAG.items()},
         **describe_house(town, number, areas, building.attributes.get(use_attribute)),
         f"{OWN}party_walls": describe_party(town, contacts),
         f"{OWN}neighbours_unknown": town.lacks_neighbours(number),
@@ -264,12 +265,12 @@ def describe_house(town: Town, number: int, areas: dict[str, float], use: Any) -
         "tabula_class": name_tabula_class(house_type, sum(floors) / 2),
         "storeys_min": storeys[0],
         "storeys_max": storeys[1],
-        "gross_floor_area_min_m2": round_value(floors[0], 2),
-        "gross_floor_area_max_m2": round_value(floors[1], 2),
-        "heated_volume_m3": round_value(figures.volume_m3, 2),
-        "envelope_area_m2": round_value(envelope, 4),
-        "compactness": round_value(envelope / figures.volume_m3, 4),
-        "ridge_direction_deg": None if ridge is None else round_value(ridge, 3),
+        "gross_floor_area_min_m2": round_number(floors[0], 2),
+        "gross_floor_area_max_m2": round_number(floors[1], 2),
+        "heated_volume_m3": round_number(figures.volume_m3, 2),
+        "envelope_area_m2": round_number(envelope, 4),
+        "compactness": round_number(envelope / figures.volume_m3, 4),
+        "ridge_direction_deg": None if ridge is None else round_number(ridge, 3),
     }
     return {OWN + name: value for name, value in values.items()}
 
@@ -287,7 +288,7 @@ def group_regions(town: Town, contacts: dict[int, tuple[Contact, ...]]) -> dict[
 def describe_party(town: Town, contacts: dict[int, tuple[Contact, ...]]) -> str:
     """Return the area (m2) of the party wall with each neighbour by id, as JSON."""
     areas = {
-        plain_text(town.read(other).id): round_value(sum(c.area_m2 for c in contacts[other]), 4)
+        plain_text(town.read(other).id): round_number(sum(c.area_m2 for c in contacts[other]), 4)
         for other in contacts
     }
     return json.dumps(areas, ensure_ascii=False)

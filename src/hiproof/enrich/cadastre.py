@@ -12,6 +12,7 @@ import shapely
 
 from ..city.work.ground import OTHER_GROUND_M
 from ..compose.blocks import make_box
+from ..compose.settle import round_number
 from ..errors import InputError
 from ..model import ROOF, Building, Solid
 from ..read.crs import find_units, horizontal_crs, parse_crs
@@ -19,7 +20,6 @@ from ..read.terrain import read_terrain
 from ..settings import EnrichSettings
 from ..write.attribute_list import OWN
 from ..write.head import FileHead
-from ..write.values import round_value
 from .far import SECTORS, TerrainHorizon, open_terrain, read_horizon
 from .party import Town
 from .records import MOST_KEPT, Records
@@ -263,7 +263,7 @@ def name_values(sun: Irradiation) -> dict[str, float]:
 
 def round_values(values: dict[str, float], digits: int) -> dict[str, Any]:
     """Return rounded values under our own names."""
-    return {OWN + name: round_value(value, digits) for name, value in values.items()}
+    return {OWN + name: round_number(value, digits) for name, value in values.items()}
 
 
 def refuse_unusable(settings: EnrichSettings) -> None:

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ..compose.settle import round_number
 from ..errors import InputError
 from ..model import GROUND, ROOF
 from ..model.roof_figures import FLAT_SLOPE_DEG
@@ -18,7 +19,7 @@ from ..write.attribute_list import OWN
 from ..write.citygml.surfaces import surface_ids
 from ..write.citygml.version2 import choose_solid
 from ..write.fragments import Sheet
-from ..write.values import round_value, xml_text
+from ..write.values import xml_text
 from .answer import is_house
 from .walls import measure_faces
 
@@ -59,7 +60,7 @@ def measure(name: str, kind: str, type: str, unit: str, value: float | None) -> 
     if value is None:
         return ""
     inner = f"<energy:type>{type}</energy:type>"
-    inner += f'<energy:value uom="{unit}">{round_value(value, 2)}</energy:value>'
+    inner += f'<energy:value uom="{unit}">{round_number(value, 2)}</energy:value>'
     return f"<energy:{name}><energy:{kind}>{inner}</energy:{kind}></energy:{name}>"
 
 
@@ -89,7 +90,7 @@ def write_boundaries(sheet: Sheet, has_solid: bool) -> Iterator[str]:
         text = f'<energy:ThermalBoundary gml:id="thermal-{id}">'
         text += f"<energy:thermalBoundaryType>{kind}</energy:thermalBoundaryType>"
         text += write_angles(normals[face])
-        text += f'<energy:area uom="m2">{round_value(float(sizes[face]), 4)}</energy:area>'
+        text += f'<energy:area uom="m2">{round_number(float(sizes[face]), 4)}</energy:area>'
         if has_solid:
             member = f'<gml:surfaceMember xlink:href="#poly-{id}"/>'
             surface = f"<gml:MultiSurface>{member}</gml:MultiSurface>"
@@ -105,8 +106,10 @@ def write_angles(normal: np.ndarray) -> str:
     text = ""
     if FLAT_SLOPE_DEG <= inclination <= 180.0 - FLAT_SLOPE_DEG:
         azimuth = float(np.degrees(np.arctan2(normal[0], normal[1])) % 360.0)
-        text = f'<energy:azimuth uom="deg">{round_value(azimuth, 3)}</energy:azimuth>'
-    return f'{text}<energy:inclination uom="deg">{round_value(inclination, 3)}</energy:inclination>'
+        text = f'<energy:azimuth uom="deg">{round_number(azimuth, 3)}</energy:azimuth>'
+    return (
+        f'{text}<energy:inclination uom="deg">{round_number(inclination, 3)}</energy:inclination>'
+    )
 
 
 def refuse_other_citygml(settings: Settings) -> None:

@@ -20,10 +20,10 @@ from typing import Any
 import numpy as np
 import shapely
 
+from ..compose.settle import round_number
 from ..frames import LocalFrame
 from ..model import ROOF, Quality, Solid
 from ..model.roof_figures import roof_figures
-from ..write.values import round_value
 from .metrics import compute_share_within_20cm, iou, plan_outline, quality, well_inside
 from .models import BuildingModel
 
@@ -181,9 +181,9 @@ def column_summaries(figures: Sequence[BuildingFigures]) -> dict[str, dict[str, 
         if len(values):
             middle, upper = np.percentile(values, (50, 90))
             summaries[name] = {
-                "mean": round_value(values.mean()),
-                "median": round_value(middle),
-                "p90": round_value(upper),
+                "mean": round_number(values.mean()),
+                "median": round_number(middle),
+                "p90": round_number(upper),
             }
     return summaries
 
@@ -216,5 +216,5 @@ def to_json(figures: Sequence[BuildingFigures]) -> str:
 def round_figure(value: Any) -> Any:
     """Round a figure; None where it is NaN, text as it is."""
     if isinstance(value, float):
-        return round_value(value) if np.isfinite(value) else None
+        return round_number(value) if np.isfinite(value) else None
     return value

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import shapely
 
+from ..compose.settle import round_number
 from ..frames import METRES, Units
 from ..model import ROOF, Building, Solid
 from ..model.roof_figures import RoofFigures, find_ground_height, roof_figures
@@ -18,7 +19,7 @@ from ..primitives.catalogue import CATALOGUE
 from ..status import Status
 from .attribute_list import OWN, PREFIX, SHAPE, TABLES
 from .reprojected import Reprojected
-from .values import metres, plain, plain_text, round_value
+from .values import metres, plain, plain_text
 
 ROW_ENCODER = json.JSONEncoder(check_circular=False)  # a row cannot hold itself
 
@@ -92,7 +93,7 @@ def osm_shape(name: str) -> str | None:
 def format_number(value: Any) -> Any:
     """Round a number to the centimetre or hundredth of a degree; NaN is None."""
     if isinstance(value, (float, np.floating)):
-        return round_value(float(value), 2) if math.isfinite(value) else None
+        return round_number(float(value), 2) if math.isfinite(value) else None
     return value
 
 
@@ -127,7 +128,7 @@ def building_attributes(
         }
         further |= {name: n for name, n in counts.items() if n}
         if building.built.eaves is not None:
-            further["volume_lod23"] = round_value(building.built.finest_solid.volume, 4)
+            further["volume_lod23"] = round_number(building.built.finest_solid.volume, 4)
     if building.epochs_used:
         further["survey_date"] = building.survey_date
         further["epochs_used"] = " ".join(building.epochs_used)
@@ -161,9 +162,9 @@ def roofer_attributes(building: Building, figures: RoofFigures | None) -> dict[s
     values |= {
         "h_ground": metres(find_ground_height(building, figures)),
         "roof_type": "no points" if building.status is Status.NO_POINTS else "unknown",
-        "rmse_lod22": round_value(quality.rmse),
-        "pt_density": round_value(quality.density),
-        "nodata_frac": round_value(quality.nodata_share),
+        "rmse_lod22": round_number(quality.rmse),
+        "pt_density": round_number(quality.density),
+        "nodata_frac": round_number(quality.nodata_share),
         "extrusion_mode": "skip",
     }
     if figures is not None:
@@ -171,8 +172,8 @@ def roofer_attributes(building: Building, figures: RoofFigures | None) -> dict[s
         values |= shape_attributes(figures) | {
             "roof_type": figures.roofer_type,
             "roof_n_surfaces": figures.roof_faces,
-            "slope": round_value(figures.slope_deg, 4),
-            "azimuth": round_value(figures.azimuth_deg, 4),
+            "slope": round_number(figures.slope_deg, 4),
+            "azimuth": round_number(figures.azimuth_deg, 4),
             "extrusion_mode": "lod11_fallback" if is_block else "standard",
         }
     return values
@@ -181,7 +182,7 @@ def roofer_attributes(building: Building, figures: RoofFigures | None) -> dict[s
 def shape_attributes(figures: RoofFigures) -> dict[str, Any]:
     """Return heights and volume, without prefix."""
     heights = {f"h_roof_{name}": metres(getattr(figures, f"h_{name}")) for name in ROOF_HEIGHTS}
-    return {**heights, "volume_lod22": round_value(figures.volume_m3, 4)}
+    return {**heights, "volume_lod22": round_number(figures.volume_m3, 4)}
 
 
 def hiproof_attributes(
@@ -198,19 +199,19 @@ def hiproof_attributes(
         "quality": None if building.grade is None else building.grade.code,
         "detail": building.detail or building.status.value,
         "roof_type": kind,
-        "roof_type_probability": None if probability is None else round_value(probability),
+        "roof_type_probability": None if probability is None else round_number(probability),
         "network_type": recognised,
         "network_type_probability": None
         if recognised is None
-        else round_value(building.recognised[recognised]),
+        else round_number(building.recognised[recognised]),
         "h_eave": None if figures is None else metres(figures.h_eave),
         "parts": len(building.parts),
         "points": int(quality.points),
-        **{name: round_value(getattr(quality, name)) for name in QUALITY_FIGURES},
+        **{name: round_number(getattr(quality, name)) for name in QUALITY_FIGURES},
         "ground_source": building.ground_source or None,
         **dict(zip(names, [None] * 3 if heights is None else map(metres, heights), strict=True)),
-        "shift_x": round_value(building.shift[0]),
-        "shift_y": round_value(building.shift[1]),
+        "shift_x": round_number(building.shift[0]),
+        "shift_y": round_number(building.shift[1]),
         "iso19107_lod22": None
         if building.built is None
         else check_as_written(building.solid, units),
@@ -250,7 +251,7 @@ def part_values(building: Building, number: int, visible: shapely.Geometry) -> d
     # Cants share a column: thirty columns that hardly a part fills would hide the others.
     cants = list_cants(part.parameters)
     rows = [
-        [round_value(part.parameters[f"{measure}_{cant}"]) for measure in MEASURES]
+        [round_number(part.parameters[f"{measure}_{cant}"]) for measure in MEASURES]
         for cant in cants
     ]
     columns = {"t_z": "z_eave_sigma", "kappa": "rotation_sigma"} | {
@@ -263,15 +264,15 @@ def part_values(building: Building, number: int, visible: shapely.Geometry) -> d
         "x": metres(x),
         "y": metres(y),
         "z_eave": metres(z),
-        "rotation": round_value(math.degrees(part.kappa)),
+        "rotation": round_number(math.degrees(part.kappa)),
         **{
-            name: round_value(value)
+            name: round_number(value)
             for name, value in part.parameters.items()
             if name not in CANTED
         },
         **({"cants": ROW_ENCODER.encode(rows)} if cants else {}),
         **{
-            columns[name]: round_value(math.degrees(value) if name == "kappa" else value)
+            columns[name]: round_number(math.degrees(value) if name == "kappa" else value)
             for name, value in part.sigma.items()
             if name in columns
         },

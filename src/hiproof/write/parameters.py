@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import shapely
 
+from ..compose.settle import round_number
 from ..model import Building, Model, Part
 from .attribute_list import TABLES
 from .fragments import Fragment, Sheet
@@ -218,8 +219,7 @@ def by_name(values: dict[str, float]) -> dict[str, float | None]:
 
 def number(value: float, digits: int = LENGTH_DIGITS) -> float | None:
     """Round a number; None for NaN and infinities, which JSON does not know."""
-    # + 0.0: minus zero is zero
-    return round(float(value), digits) + 0.0 if math.isfinite(value) else None
+    return round_number(value, digits) if math.isfinite(value) else None
 
 
 def places(xyz: np.ndarray) -> list[list[float | None]]:

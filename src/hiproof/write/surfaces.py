@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from ..compose.settle import round_number
 from ..model import ROOF, Face, Part
 from ..model.roof_figures import FLAT_SLOPE_DEG, RoofFigures
 from ..primitives.catalogue import SMOOTH
-from .values import round_value
 
 SUMMED = ("_kwh", "_area_m2")  # Ends of the names of values that add up; others are means by area.
 
@@ -73,7 +73,7 @@ def join_values(
         elif face == faces[0]:
             shares = figures.face_area_m2[faces] / figures.face_area_m2[faces].sum()
             joined[numbers[face]] = {
-                name: round_value(
+                name: round_number(
                     sum(
                         values[member][name] * (1.0 if name.endswith(SUMMED) else share)
                         for member, share in zip(faces, shares.tolist(), strict=True)

@@ -10,18 +10,15 @@ from typing import Any
 
 import numpy as np
 
+from ..compose.settle import PLAN_DIGITS, round_number
+
 # as many characters as any coordinate takes: room in a head for what is known at the end
 WIDEST = -123456789.1234
 
 
-def round_value(value: float, digits: int = 6) -> float:
-    """Round `value`; minus zero becomes zero, NaN and infinities stay."""
-    return round(float(value), digits) + 0.0
-
-
 def metres(value: float) -> float:
     """Round to a tenth of a millimetre, as coordinates are written."""
-    return round_value(value, 4)
+    return round_number(value, PLAN_DIGITS)
 
 
 def plain(value: Any) -> Any:

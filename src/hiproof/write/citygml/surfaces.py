@@ -12,11 +12,12 @@ from typing import Any
 
 import numpy as np
 
+from ...compose.settle import round_number
 from ...frames import Units
 from ...model import CEILING, GROUND, ROOF, WALL, Face, Part, Solid
 from ...model.roof_figures import RoofFigures
 from ..surfaces import group_faces, join_values, measure_angles, number_surfaces
-from ..values import generic_attribute, round_value
+from ..values import generic_attribute
 
 ROLES = {ROOF: "roof", WALL: "wall", GROUND: "ground", CEILING: "ceiling"}
 
@@ -103,7 +104,7 @@ def boundary_surfaces(
         if solid.faces[number].kind == ROOF:
             angles = zip(("slope", "azimuth"), measure_angles(figures, faces), strict=True)
             known = {
-                n: round_value(angle, 3) for n, angle in angles if math.isfinite(angle)
+                n: round_number(angle, 3) for n, angle in angles if math.isfinite(angle)
             } | known
         generic = "".join(generic_attribute(name, value) for name, value in known.items())
         members = "".join(

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import shapely
 
+from ...compose.settle import round_number
 from ...frames import METRES, Units
 from ...model import GROUND, ROOF, Building, Face, Solid
 from ...model.roof_figures import RoofFigures
@@ -17,7 +18,7 @@ from ..building_attributes import OWN
 from ..fragments import Sheet
 from ..shapes import PartShape, Shapes
 from ..surfaces import group_faces, join_values, measure_angles, number_surfaces
-from ..values import plain, round_value
+from ..values import plain
 
 LOD_SOLID, LOD_OVERHANGS, LOD_FOOTPRINT = "2.2", "2.3", "0"
 
@@ -158,8 +159,8 @@ def describe_solid(
         slope, azimuth = measure_angles(figures, faces)
         described[number] = {
             "type": ROOF,
-            f"{prefix}slope": plain(round_value(slope, 3)),
-            f"{prefix}azimuth": plain(round_value(azimuth, 3)),
+            f"{prefix}slope": plain(round_number(slope, 3)),
+            f"{prefix}azimuth": plain(round_number(azimuth, 3)),
         }
         if 0 <= face.part < len(parts):
             own = {f"{OWN}part": int(face.part), f"{OWN}part_type": parts[face.part].type}

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import shapely
 
+from ...compose.settle import round_number
 from ...errors import OutputError
 from ...frames import METRES, Units
 from ...geometry.flat_shell import FlatShell
@@ -17,7 +18,7 @@ from ..attribute_list import TABLES
 from ..building_attributes import ROW_ENCODER, part_values
 from ..fragments import Sheet
 from ..surfaces import number_surfaces
-from ..values import metres, plain_text, round_value
+from ..values import metres, plain_text
 
 Row = tuple[bytes | None, dict[str, Any]]  # the geometry as WKB, the values by column
 
@@ -120,8 +121,8 @@ def surface_rows(
             "number": place[numbers[index]],
             "part": face.part if mask else None,
             "type": building.parts[face.part].type if mask else None,
-            "slope_deg": round_value(figures.face_slope_deg[index], 3),
-            "azimuth_deg": round_value(azimuth, 3) if math.isfinite(azimuth) else None,
+            "slope_deg": round_number(figures.face_slope_deg[index], 3),
+            "azimuth_deg": round_number(azimuth, 3) if math.isfinite(azimuth) else None,
             "area_m2": metres(figures.face_area_m2[index]),
             **attributes.get(index, {}),
         }
