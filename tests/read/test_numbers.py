@@ -8,6 +8,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
+from any_text import ANY_TEXT
 from hiproof.city.plan.overrides import check_number_columns
 from hiproof.city.plan.passages import add_passages
 from hiproof.city.request import Request
@@ -29,7 +30,7 @@ def test_plain_numbers_are_read(value, unit, point):
     assert read_number(float(value)) == read_number(str(value)) == float(value)
 
 
-@given(st.text(max_size=12))
+@given(ANY_TEXT)
 def test_other_text_is_no_number(text):
     """Whatever is read is a number with at most a comma and a unit of length."""
     number = read_number(text)
