@@ -48,9 +48,7 @@ TILE_FOLDER = "models"  # in a run's folder: the models of work tiles, where a r
 
 
 def list_requested_files(settings: Settings, folder: Path) -> dict[str, Path]:
-    """Return the paths of a run's files for the whole area, by format.
-
-    They lie in `folder`, and are those that these settings write.
+    """Return paths in `folder`, by format, of the files for the whole area of a run.
 
     >>> [path.name for path in list_requested_files(Settings(), Path("models")).values()]
     ['buildings.gml', 'buildings.city.jsonl', 'parameters.jsonl', 'buildings.gpkg']
@@ -76,9 +74,7 @@ def list_requested_tile_files(settings: Settings, folder: Path, tile: str) -> di
 
 
 def list_model_paths(settings: Settings, folder: Path) -> list[Path]:
-    """Return the places of a run's models in `folder`.
-
-    They are files of the whole area, and the folder of those of work tiles.
+    """Return where a run's models lie in `folder`: files of the whole area, a folder of tiles.
 
     >>> [path.name for path in list_model_paths(Settings.from_dict({"write": {"citygml": "3.0"}}),
     ...     Path("out"))]
@@ -111,9 +107,7 @@ def import_format(name: str) -> ModuleType:
 
 
 def choose_format(file: str) -> str | None:
-    """Return the format of files named like `file`, or None.
-
-    All that ends the name counts, else its last suffix.
+    """Return the format of files named like `file` by its whole ending, else its suffix, or None.
 
     >>> [choose_format(name) for name in ("a.gml", "a.citygml3.gml", "b.json", "c.jsonl", "d.txt")]
     ['citygml2', 'citygml3', 'cityjson', 'cityjsonseq', None]

@@ -223,9 +223,7 @@ class StageBars:
 
 
 def describe(finished: int, total: int | None, seconds: float, unit: str, first: int = 0) -> str:
-    """Describe in words how far a stage is.
-
-    It began at `first` of `total` so many `seconds` ago.
+    """Describe in words how far a stage is that began at `first` of `total` `seconds` ago.
 
     >>> describe(120, 1000, 10.0, "building")
     '120 of 1,000 buildings, 12 a second, 73 s left'

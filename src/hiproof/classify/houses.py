@@ -1,6 +1,4 @@
-"""Houses that touch, separated where their roofs differ.
-
-They differ by a step, another ridge or another eave all along a straight line.
+"""Houses that touch, separated where their roofs differ all along a straight line.
 
 A bond joins two neighbouring points in plan; it holds where one surface goes on from one to the
 other. A line is crossed by bonds in runs; it may cut the block in those runs across which hardly
@@ -133,10 +131,9 @@ class Cut:
 def separate_houses(
     xyz: np.ndarray, area: shapely.Geometry, gap_m: float
 ) -> list[shapely.Geometry]:
-    """Return the areas of the single houses among roof points (n, 3) in `area`.
+    """Return the areas of the single houses among roof points (n, 3) in `area`, world metres.
 
-    All are in world metres. Together the houses are the area. Parts of the area within `gap_m` of
-    each other are one block.
+    Together the houses are the area. Parts of the area within `gap_m` of each other are one block.
 
     >>> x, y = (axis.ravel() for axis in np.meshgrid(np.arange(0.2, 16, 0.4), np.arange(0.2, 9,
     ...     0.4)))

@@ -67,10 +67,7 @@ def split_buildings(
     box: Box | None = None,
     progress: Progress = ignore,
 ) -> list[FoundBuilding]:
-    """Split `cloud` into its buildings.
-
-    They come from the points of its building class or, where it has none, from roofs found by
-    shape.
+    """Split `cloud` into buildings by its building class, or by roofs found by shape.
 
     A small file that holds one roof alone is one building; one of several roofs cut out beforehand
     is as if their class were known. Houses that touch are told apart where their roofs say so

@@ -80,11 +80,7 @@ def print_files(files: Iterable[Path], seconds: Mapping[str, float]) -> None:
 
 
 def describe_overview(overview: Overview, by_quality: Mapping[str, int], out: str) -> list[str]:
-    """Describe the overview of the run in the folder `out` in lines.
-
-    They are the result, the models' quality, how well they fit, and what needs attention with the
-    command that shows it.
-    """
+    """Describe the overview of a run in lines: its result, quality and fit, and what to look at."""
     lines = [click.style(overview.headline, bold=True)]
     if by_quality:
         lines.append("quality: " + graded_words(by_quality))

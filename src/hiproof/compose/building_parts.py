@@ -69,10 +69,10 @@ def building_parts(solid: Solid) -> tuple[BuildingPart, ...]:
 
 
 def join_parts(parts: Solid) -> Solid:
-    """Join `parts`, building parts over common vertices, into one solid.
+    """Join `parts`, the shells into which a building was cut, into one solid.
 
-    They are the shells into which it was cut. Its roof faces come first, in the order in which they
-    stand in `parts`; its walls are not joined along straight stretches.
+    They have common vertices. Roof faces come first, in the order in which they stand in `parts`;
+    walls are not joined along straight stretches.
     """
     return make_part(list_lids(parts, ROOF), find_base(parts)).solid
 

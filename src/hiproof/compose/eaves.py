@@ -184,10 +184,9 @@ def find_ground(solid: Solid) -> float:
 
 
 def widen_roof(roof: Roof, widths: np.ndarray) -> Roof:
-    """Return the roof drawn out beyond the edges of its outline.
+    """Return the roof drawn out by `widths` (n,) (m) beyond the edges of its outline.
 
-    It is by `widths` (n,) in metres. Each piece goes on in its own planes beyond the stretches of
-    edges at which it is seen.
+    Each piece goes on in its own planes beyond the stretches of edges at which it is seen.
     """
     edges = list_outline_edges(roof.outline)
     strips = make_strips(edges, widths)

@@ -51,8 +51,8 @@ def refuse_many(parts: Sequence) -> None:
 def refuse_wrong_part(part: Part, index: int, roof: Roof, visited: dict[tuple, int]) -> None:
     """Raise InputError for a part that no file may hold.
 
-    It has no finite planes, lies off the outline, or equals one `visited` before. `visited` holds
-    the numbers of earlier parts by their content; the part is added to it.
+    Such a part has no finite planes, lies off the outline, or equals one `visited` before.
+    `visited` holds the numbers of earlier parts by their content; the part is added to it.
     """
     if not all(np.isfinite(piece.planes).all() for piece in part.pieces):
         raise InputError(

@@ -136,10 +136,9 @@ def count_storeys(eave_m: float, heights: tuple[float, float]) -> tuple[int, int
 def measure_floors(
     solid: Solid, z_ground: float, eave_m: float, heights: tuple[float, float]
 ) -> tuple[float, float]:
-    """Return the least and the greatest gross floor area (m2), attics included.
+    """Return the gross floor areas (m2), attics included, of the fewest and the most storeys.
 
-    They are those of the least and the greatest number of storeys. A floor is as large as the plan
-    in which the roof is at least HEADROOM_M above it.
+    A floor is as large as the plan in which the roof is at least HEADROOM_M above it.
     """
     low, high = heights
     least, greatest = count_storeys(eave_m, heights)

@@ -186,10 +186,7 @@ class Cadastre:
     def describe(
         self, number: int, solid: Solid, party: Collection[int] = ()
     ) -> tuple[dict[str, Any], Surfaces]:
-        """Return attributes of building `number`, and of its faces.
-
-        These are by number in its `solid`, of which the faces `party` are party walls.
-        """
+        """Return attributes of a building and of faces of its `solid`; `party` are party walls."""
         attributes, surfaces = self.describe_roofs(number, solid)
         attributes[f"{OWN}sun_sky"] = name_sky(self.settings.weather)
         if self.settings.sun_on_walls:

@@ -373,9 +373,7 @@ def locate_station(station: dict[str, Any]) -> tuple[float, float]:
 
 
 def measure_distance(one: tuple[float, float], other: tuple[float, float]) -> float:
-    """Return the distance (km) of two places.
-
-    These are given by latitude and longitude (degrees).
+    """Return the distance (km) of two places in latitude and longitude (degrees).
 
     >>> round(measure_distance((52.0, 4.4), (48.1, 11.6)))
     672

@@ -141,10 +141,10 @@ def points_by_outline(
 def match_by_id_or_overlap(
     models: Sequence[BuildingModel], neighbours: Sequence[tuple[str, shapely.Geometry]]
 ) -> list[int | None]:
-    """Return the index of the area that stands for each model.
+    """Return the index of each model's area: the one of its id, or one that overlaps it more.
 
-    It is the one of the same id, unless another overlaps the model in plan more than twice as much:
-    ids that are numbers name other buildings in another file.
+    Another area counts where it overlaps the model in plan more than twice as much: ids that are
+    numbers name other buildings in another file.
     """
     by_id = {id: i for i, (id, _) in enumerate(neighbours)}
     areas = np.array([area for _, area in neighbours], dtype=object)

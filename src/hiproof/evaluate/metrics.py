@@ -69,9 +69,7 @@ def psd(model: Solid | Fit | Polygons, points: np.ndarray) -> np.ndarray:
 
 
 def iou(a: shapely.Geometry, b: shapely.Geometry) -> float:
-    """Return the area of the intersection over that of the union.
-
-    It is NaN when neither has an area.
+    """Return the area of the intersection over that of the union, NaN when neither has one.
 
     >>> iou(shapely.box(0, 0, 2, 1), shapely.box(1, 0, 3, 1))
     0.3333333333333333

@@ -1,6 +1,4 @@
-"""One self-contained HTML page about a run.
-
-It has a map, a 3D view, distributions, the worst buildings and settings.
+"""One self-contained HTML page about a run: map, 3D view, distributions, worst buildings.
 
 The page opens from the file system and asks nothing of the network: styles, scripts and data are in
 it.

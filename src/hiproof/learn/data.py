@@ -288,10 +288,9 @@ class Shape:
 
 
 def read_shapes(path: Path) -> list[Shape]:
-    """Read the solids of a CityJSON file with a known roofType.
+    """Read the solids of 12 m2 or more of a CityJSON file with a known roofType.
 
-    They have 12 m2 or more of ground. All parts of a building are held out together. Raises
-    InputError for a file that is no CityJSON.
+    All parts of a building are held out together. Raises InputError for a file that is no CityJSON.
     """
     solids = dict(read_solids(path))
     objects = {name: item for feature in features(path) for name, item in feature.objects.items()}

@@ -72,10 +72,10 @@ class SetAbstraction(nn.Module):
 
 
 class FeaturePropagation(nn.Module):
-    """Coarse features interpolated at finer points, through a layer.
+    """Coarse features interpolated at finer points and joined with theirs, through a layer.
 
-    They are joined with the fine ones. The layer's coarse half is applied before interpolation,
-    with which it commutes and where the rows are few.
+    The layer's coarse half is applied before interpolation, with which it commutes and where the
+    rows are few.
     """
 
     def __init__(self, coarse: int, fine: int, outputs: int):

@@ -1,6 +1,4 @@
-"""Training by PointNeXt's recipe, with checkpoints.
-
-It uses AdamW, a cosine schedule and label smoothing, and keeps the best by validation.
+"""Training by PointNeXt's recipe: AdamW, a cosine schedule, label smoothing, checkpoints.
 
 Every random draw is named by the seed and a sample's or an epoch's number, so that a run that was
 killed and resumed gives the weights of one that was not.
@@ -67,9 +65,7 @@ def train(
     report: Callable[[str], object] = print,
     update: Update = ignore_progress,
 ) -> Path:
-    """Train the network on `data`, and write the results to the folder `out`.
-
-    They are weights, curve, model card and checkpoints.
+    """Train the network on `data`; write weights, curve, model card and checkpoints to `out`.
 
     `data`: "simulated", "denhaag:FILE", "roofn3d:DIR", or a list of these (the first makes up 70
     %). A checkpoint in `out` is resumed. `report` takes a line after every epoch, `update` how many

@@ -202,8 +202,8 @@ def with_recess(
 ) -> list[Any]:
     """Return the parts with a recess, turned as part `index` is.
 
-    It lies at `position` (x, y about the roof's origin), else in the middle of part `index`. Raises
-    InputError for a part of which nothing is left.
+    Its middle is at `position` (x, y about the roof's origin), else in the middle of part `index`.
+    Raises InputError for a part of which nothing is left.
     """
     surroundings = with_sizes(parts[index])
     x, y = surroundings["position"][:2] if position is None else position

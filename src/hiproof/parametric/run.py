@@ -41,10 +41,9 @@ MOST_REPORTED = 1000
 
 @dataclass
 class Built:
-    """The result of building a file.
+    """The result of building a file: models, counts by status, and what could not be built.
 
-    It says where the models are, counts buildings by status, and lists (id, sentence) of those that
-    could not be built, the first MOST_TOLD.
+    `not_built` lists (id, sentence) of the first MOST_REPORTED.
     """
 
     models: list[Path] = field(default_factory=list)

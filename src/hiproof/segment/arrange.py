@@ -1,6 +1,4 @@
-"""A building's cloud arranged for the network.
-
-It has a canonical frame, local features, farthest-point levels and neighbourhoods.
+"""A building's cloud for the network: frame, features, farthest-point levels, neighbourhoods.
 
 All of it is free of weights, shared by training and inference, and follows the points under
 rotation about Z.

@@ -95,12 +95,11 @@ def cast_crowns(
     free_path: np.ndarray,
     z_crown: np.ndarray,
 ) -> None:
-    """Raise `z_crown` (n,) to where a tree's crown catches a beam.
+    """Raise `z_crown` (n,) to where a tree's crown catches a beam after `free_path` (n,) metres.
 
-    It is caught after `free_path` (n,) metres of leaves. `crowns` (t, 5) = (x, y, z of the centre,
-    horizontal and vertical half axes) of upright ellipsoids. A beam whose way through a crown is
-    shorter than its free path comes out below, so the ground and the roof under a tree are thinned,
-    not hidden.
+    `crowns` (t, 5) = (x, y, z of the centre, horizontal and vertical half axes) of upright
+    ellipsoids. A beam whose way through a crown is shorter than its free path comes out below, so
+    the ground and the roof under a tree are thinned, not hidden.
     """
     for *centre, r, h in crowns:
         near = select_passing(xy0, slope, np.array(centre), r + h)

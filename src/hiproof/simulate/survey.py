@@ -86,10 +86,9 @@ def survey(
     seed: int,
     settings: ScanSettings,
 ) -> Iterator[Scan]:
-    """Yield the points (world) of each of `patches`.
+    """Yield the points (world) of each of `patches`, whatever else of the town is surveyed.
 
-    They are the same whatever else of the town is surveyed. `lots` must hold every lot that reaches
-    into the patches.
+    `lots` must hold every lot that reaches into the patches.
     """
     lot_bounds = np.array([lot.bounds for lot in lots]).reshape(-1, 4)
     for lower, upper in patches:

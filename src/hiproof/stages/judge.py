@@ -76,10 +76,10 @@ def grade_building(
 
 
 def add_cautions(building: Building, points: np.ndarray, inner: Inner) -> Building:
-    """Add doubts about a building to its detail.
+    """Add doubts about a building to its detail: ground above its eaves, or two surfaces.
 
-    They are ground above its eaves and, by its points (n, 3), in the roof's frame, and those well
-    `inner`, two surfaces one over the other.
+    Two surfaces, one over the other, are found among the points (n, 3) in the roof's frame that lie
+    well `inner`.
     """
     from ..evaluate.layers import find_second_surface
 

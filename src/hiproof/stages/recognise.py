@@ -12,10 +12,10 @@ from ..settings import Settings
 
 @dataclass(frozen=True)
 class Recognised:
-    """The network's opinion.
+    """The network's opinion: probabilities by roof type, empty without it, and point weights.
 
-    It has probabilities by roof type, empty without it, and a weight (n,) a point (1 roof, 0 not)
-    for a fit of one primitive; a fit of several weighs all points alike.
+    Weights (n,) are 1 for a roof and 0 else, for a fit of one primitive; a fit of several weighs
+    all points alike.
     """
 
     weights: np.ndarray | None = None

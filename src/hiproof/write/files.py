@@ -1,6 +1,4 @@
-"""Files that appear whole or not at all.
-
-They are written beside their place under a hidden name, synced, then renamed.
+"""Files that appear whole or not at all: written beside their place, synced, then renamed.
 
 Whatever goes wrong on the way (an exception, Ctrl-C, a full disk), the half-written file is removed
 and a file that stood there before keeps its content. What the file system refuses becomes an

@@ -1,6 +1,4 @@
-"""A building's texts, ready to be joined into the files of a run.
-
-This module also stores them until then.
+"""A building's texts, kept until they are joined into the files of a run.
 
 A work tile's buildings are one file of plain arrays: bytes one after the other with the ends of
 each, and numbers. A file that somebody else could have written is only ever read as data.

@@ -116,9 +116,7 @@ def srs_name(crs: Any) -> str | None:
 
 
 def reference_system(crs: Any) -> str | None:
-    """Return CityJSON's `referenceSystem`, which holds one code.
-
-    It is the compound's own where it has one, else the plan's.
+    """Return CityJSON's `referenceSystem`: the code of the compound, else that of the plan.
 
     >>> reference_system("EPSG:28992+5709"), reference_system(None)
     ('https://www.opengis.net/def/crs/EPSG/0/7415', None)

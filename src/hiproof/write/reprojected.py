@@ -84,10 +84,10 @@ class Reprojected(Units):
 
 
 def choose_file_crs(crs: Any, requested: str) -> Any:
-    """Return the CRS in which files of a run in `crs` are written.
+    """Return the CRS in which files of a run in `crs` are written, the one `requested`.
 
-    It is the one `requested`, with the run's heights where it names none. Raises InputError for one
-    that is no projection, or where the run's is not known.
+    It has the run's heights where it names none. Raises InputError for one that is no projection,
+    or where the run's is not known.
 
     >>> describe_crs(choose_file_crs("EPSG:7415", "EPSG:25831"))
     'ETRS89 / UTM zone 31N + NAP height'

@@ -17,9 +17,7 @@ SUMMED = ("_kwh", "_area_m2")  # Ends of the names of values that add up; others
 
 
 def number_surfaces(faces: Sequence[Face], parts: Sequence[Part]) -> list[int]:
-    """Return the number of each face's surface.
-
-    All facets of a curved roof part are one surface.
+    """Return the number of each face's surface, one for all facets of a curved roof part.
 
     >>> facets = [Face(((0, 1, 2),), ROOF, part) for part in (0, 1, 0, 1)]
     >>> number_surfaces(facets, [Part("gable", ()), Part("cone", ())])

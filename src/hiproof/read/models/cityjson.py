@@ -121,10 +121,10 @@ ESCAPED = re.compile(
 
 
 class Feature(NamedTuple):
-    """A CityJSON document or a line of CityJSONSeq.
+    """A CityJSON document or a line of CityJSONSeq: its city `objects` by id and its vertices.
 
-    It has the city `objects` by id, their vertices (n, 3) in world metres, its place in the file,
-    and the units of its coordinates. A feature that `is_damaged` cannot be read and has no objects.
+    Vertices (n, 3) are in world metres, and `units` those of the file's coordinates. A feature that
+    `is_damaged` cannot be read and has no objects.
     """
 
     objects: dict[str, Any]

@@ -53,9 +53,7 @@ def read_footprints(
     where: str | None = None,
     bbox: Box | None = None,
 ) -> tuple[Footprint, ...]:
-    """Read footprints from a file, URL or data source, in world metres.
-
-    They come in `target_crs` (the cloud's) where one is given.
+    """Read footprints from a file, URL or data source, in world metres of `target_crs` if given.
 
     `layer` names one of a file's layers, which may be left out where only one holds geometries.
     Multipolygons are split into footprints `ID-1`, `ID-2`, ... whose attribute `part_of` is the

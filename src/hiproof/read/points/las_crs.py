@@ -130,11 +130,9 @@ def value_at(place: int, length: int, position: int, doubles: bytes, texts: byte
 
 
 def decode_crs(directory: bytes, doubles: bytes = b"", texts: bytes = b"") -> CRS | None:
-    """Return the CRS of plan and heights that the keys define.
+    """Return the CRS of plan and heights that the keys define, or of heights alone, or None.
 
-    It is that of the heights alone where there is no plan, and None without either. Raises CRSError
-    for keys that cannot be understood. Raises CRSError where the keys define one that cannot be
-    understood.
+    Raises CRSError for keys that cannot be understood.
     """
     keys = GeoKeys.of(directory, doubles, texts)
     plan, heights = keys.plan(), keys.heights()

@@ -1,6 +1,4 @@
-"""Checks of the header of a LAS, LAZ or COPC file.
-
-They run before any number of the header is used.
+"""Checks of the header of a LAS, LAZ or COPC file, before any number of it is used.
 
 Every count is held against the file's size: of records, of points, of LASzip's chunks, of COPC's
 pages and nodes. Scales, offsets and bounds are held against each other. The layouts are those of
@@ -193,10 +191,10 @@ def iterate_records(file: BinaryIO, facts: LasFacts) -> Iterator[tuple[tuple[str
 
 
 def compressed_points(file: BinaryIO, facts: LasFacts) -> int:
-    """Return the number of points in LASzip's chunks.
+    """Return the points in LASzip's chunks, or the header's number where versions leave it open.
 
-    It is the header's number where older versions leave it open. Raises Implausible for a table of
-    chunks that does not fit the file: a decoder would make room for what it says.
+    Raises Implausible for a table of chunks that does not fit the file: a decoder would make room
+    for what it says.
     """
     laszip = facts.laszip
     if len(laszip) < 34:

@@ -24,10 +24,9 @@ BYTE_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">
 
 @dataclass(frozen=True)
 class PlyLayout:
-    """The header of a PLY file.
+    """The header of a PLY file, with the columns of x, y, z and class.
 
-    It has the byte order ("" is ascii), vertices, their properties (name, NumPy type), and the
-    columns of x, y, z and class.
+    The byte order "" is ascii. Properties are (name, NumPy type).
     """
 
     byte_order: str

@@ -43,10 +43,9 @@ class TerrainChain:
         return self.heights_and_sources(xy_world)[0]
 
     def find_known_heights(self, xy_world: np.ndarray, minimum: int) -> np.ndarray:
-        """Return the heights (n,) of the first terrain that knows enough places.
+        """Return the heights (n,) of the first terrain that knows enough places, else NaN.
 
-        It knows at least `minimum` of `xy_world` (n, 2) and does not guess (by a true `is_guess`).
-        Heights are NaN where there is none.
+        It has to know at least `minimum` of `xy_world` (n, 2) without guessing (a true `is_guess`).
         """
         for terrain in self.terrains:
             heights = (

@@ -1,6 +1,4 @@
-"""Checks that a raster can be a terrain model.
-
-They cover its position, its bands and their unit.
+"""Checks that a raster can be a terrain model: its position, its bands and their unit.
 
 Every refusal is one sentence, raised before any height is read.
 """

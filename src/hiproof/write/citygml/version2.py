@@ -49,9 +49,7 @@ MIXED = {"sig3d": "1130", "adv": "5000"}
 
 
 def roof_type_code(types: Iterable[str], code_list: str = "sig3d") -> str:
-    """Return the code of roof parts of `types`.
-
-    It is their own where all have the same, else that of a mixed roof.
+    """Return the code that roof parts of `types` have in common, else that of a mixed roof.
 
     >>> roof_type_code(["gable", "asymmetric_gable"]), roof_type_code(["gable",
     ...     "hip"]), roof_type_code(["hip"], "adv")

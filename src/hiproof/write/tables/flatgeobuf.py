@@ -7,10 +7,9 @@ from .vector_layer import column_names, translate_write_errors, write_layer
 
 
 class FlatGeobufWriter(AttributesWriter):
-    """Incremental writer of the rows of the GeoPackage's buildings.
+    """Incremental writer of the GeoPackage's buildings that have an outline.
 
-    Those without an outline are left out, since a spatial index cannot hold them. All rows are in
-    memory at the end.
+    A spatial index cannot hold the others. All rows are in memory at the end.
     """
 
     layers = (BUILDINGS,)

@@ -1,6 +1,4 @@
-"""buildings.gpkg: outlines with attributes, parts and roof surfaces.
-
-They are tables for QGIS and its like.
+"""buildings.gpkg: outlines with attributes, parts and roof surfaces, as tables for QGIS.
 
 A table's columns need one type each, known before the first row, while the input's attributes may
 differ from building to building: rows wait in a temporary file until the last building has settled
@@ -52,9 +50,7 @@ def write_attributes(
     crs: Any = None,
     prefix: str = PREFIX,
 ) -> None:
-    """Write the GeoPackage `path`.
-
-    It has layers of the outlines of `buildings` (world coordinates), their parts and roof surfaces.
+    """Write the GeoPackage `path` of outlines (world coordinates), parts and roof surfaces.
 
     A building whose outline is unknown gets a row without geometry. Values of one column are
     brought to one type: whole numbers and decimals to decimals, anything beside text to text.

@@ -98,10 +98,9 @@ def surface_rows(
     units: Units,
     attributes: dict[int, dict[str, Any]],
 ) -> tuple[Row, ...]:
-    """Return a row a roof face of the solid.
+    """Return a row a roof face: polygon, slope, azimuth, area, part and its `attributes`.
 
-    It has its polygon, slope, azimuth, area and part, and its `attributes`, given by face. Facets
-    of one curved surface have one number.
+    Attributes are given by face. Facets of one curved surface have one number.
     """
     if figures is None:
         return ()
