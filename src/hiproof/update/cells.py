@@ -276,23 +276,25 @@ def measure_residuals(roof: Roof, points: np.ndarray) -> np.ndarray:
     It is that over the surface below a point where the point lies on it. Otherwise the nearest in
     height counts of all surfaces that show within STEP_REACH_M. The height is NaN beside the roof.
     """
-    pieces = [Part("", (piece,)) for piece in roof.pieces]
-    result = points[:, 2] - find_highest(pieces, np.ascontiguousarray(points[:, :2]))[0]
+    result = points[:, 2] - find_pieces(roof, points[:, :2])[0]
     other = np.flatnonzero(np.abs(result) > ON_SURFACE_M)
-    result[other] = measure_nearest(roof, pieces, points[other], result[other])
+    result[other] = measure_nearest(roof, points[other], result[other])
     return np.where(np.isfinite(result), result, np.nan)
 
 
-def measure_nearest(
-    roof: Roof, pieces: list[Part], points: np.ndarray, own: np.ndarray
-) -> np.ndarray:
+def find_pieces(roof: Roof, xy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the height (n,) of the roof at `xy` (n, 2), and the piece that shows there."""
+    return find_highest([Part("", (piece,)) for piece in roof.pieces], xy)
+
+
+def measure_nearest(roof: Roof, points: np.ndarray, own: np.ndarray) -> np.ndarray:
     """Return the height (n,) of points (n, 3) over the surface nearest in height.
 
     `own` (n,) is that over the surface below them; others show within STEP_REACH_M.
     """
     xy = points[:, :2]
     around = (xy + STEP_REACH_M * DIRECTIONS[:, None, :]).reshape(-1, 2)
-    found, top = find_highest(pieces, around)
+    found, top = find_pieces(roof, around)
     heights = np.array([piece.height_at(xy) for piece in roof.pieces])
     over = points[:, 2] - heights[top.reshape(len(DIRECTIONS), -1), np.arange(len(points))]
     over[~np.isfinite(found).reshape(over.shape)] = np.inf
@@ -305,8 +307,7 @@ def find_slopes(roof: Roof, xy: np.ndarray) -> np.ndarray:
     result = np.full((len(xy), 2), np.nan)
     if not len(xy):
         return result
-    pieces = [Part("", (piece,)) for piece in roof.pieces]
-    heights, top = find_highest(pieces, np.ascontiguousarray(xy))
+    heights, top = find_pieces(roof, xy)
     for number, piece in enumerate(roof.pieces):
         mask = (top == number) & np.isfinite(heights)
         if mask.any():

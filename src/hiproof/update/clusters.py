@@ -102,7 +102,7 @@ def group_cells(
     """
     keys = comparison.cells.astype(np.int64) @ KEY_OF_CELL
     linked = np.flatnonzero(is_chosen | ~comparison.is_compared)
-    labels = label_components(len(linked), link_neighbours(keys[linked], beside))
+    labels = label_cells(keys[linked], beside)
     for label in np.unique(labels[is_chosen[linked]]):
         members = linked[labels == label]
         yield members[is_chosen[members]]
@@ -173,13 +173,14 @@ def is_known_around(comparison: CellComparison, members: np.ndarray) -> np.ndarr
     return result
 
 
-def link_neighbours(keys: np.ndarray, beside: np.ndarray = KEY_OF_CELL) -> np.ndarray:
-    """Return the pairs (2, p) of cells by their numbers `keys` (k,), of which one is `beside`.
+def label_cells(keys: np.ndarray, beside: np.ndarray) -> np.ndarray:
+    """Return the label (k,) of the connected group of each cell, by their numbers `keys` (k,).
 
-    They share a side, with AROUND_KEYS a side or a corner.
+    Cells are connected of which one is `beside` the other: with KEY_OF_CELL they share a side, with
+    AROUND_KEYS a side or a corner.
     """
     pairs = [np.intersect1d(keys + side, keys, return_indices=True)[1:] for side in beside]
-    return np.hstack(pairs)
+    return label_components(len(keys), np.hstack(pairs))
 
 
 def describe_cluster(

@@ -89,11 +89,8 @@ def read_earlier(folder: Path) -> EarlierRun:
             InputWarning,
         )
     named = str((record.get("update") or {}).get("survey_date") or "")
-    overrides, date = (
-        find_overrides(folder, record),
-        (named or max(record.get("epochs") or [""]) or date_by_points(inputs.clouds)),
-    )
-    return EarlierRun(head, records, settings, surveys, overrides, date)
+    date = named or max(record.get("epochs") or [""]) or date_by_points(inputs.clouds)
+    return EarlierRun(head, records, settings, surveys, find_overrides(folder, record), date)
 
 
 def find_overrides(folder: Path, record: dict[str, Any]) -> str | None:

@@ -77,11 +77,11 @@ class Difference:
     """
 
     kind: ChangeKind
-    difference_m: float
-    sigma_m: float
     area_m2: float
     place: shapely.Geometry
     parts: tuple[int, int] = (-1, -1)
+    difference_m: float = math.nan
+    sigma_m: float = math.nan
 
 
 @dataclass(frozen=True)
@@ -152,10 +152,10 @@ def name_doubts(verdict: ChangeVerdict) -> list[Difference]:
     return [
         Difference(
             ChangeKind.UNCLEAR,
-            cluster.difference_m,
-            cluster.sigma_m,
             cluster.area_m2,
             draw_cells(c.cells[cluster.members], c.cell_m),
+            difference_m=cluster.difference_m,
+            sigma_m=cluster.sigma_m,
         )
         for cluster in clusters
     ]
@@ -275,7 +275,7 @@ def describe_place(
     variance = MEDIAN_VARIANCE * np.mean(c.sigma[members] ** 2) / len(members)
     sigma = math.hypot(sides.sigma_m, math.sqrt(variance))
     middle, area = float(np.median(sides.difference[inside])), len(members) * c.cell_m2
-    return Difference(kind, middle, sigma, area, draw_cells(c.cells[members], c.cell_m), pair)
+    return Difference(kind, area, draw_cells(c.cells[members], c.cell_m), pair, middle, sigma)
 
 
 def moves_together(differences: np.ndarray) -> bool:

@@ -21,14 +21,12 @@ from ..model.heights import find_highest
 from ..parametric.building import build
 from ..parametric.refit import measure_building, select_inside
 from ..write.parameters import LENGTH_DIGITS, building_record
+from .members import SAME_OUTLINE, compute_overlap
 
 PART_GRID_M = 0.5  # of the places where parts are compared
 
 SAME_PLACE = 0.5
 """Intersection over union of the places of two parts from which on one continues the other."""
-
-SAME_OUTLINE_SHARE = 0.9
-"""The same of their outlines, from which on the earlier outline stands, too."""
 
 LARGEST_GAP_M2 = 0.05
 """Area (m2) between parts, beyond which parts of two epochs do not fit each other."""
@@ -158,8 +156,7 @@ def has_same_outline(old: Building, j: int, new: Building, k: int) -> bool:
     shift = old.roof.frame.origin - new.roof.frame.origin
     first = unite_pieces(old.parts[j].pieces)
     second = unite_pieces([piece.move(-shift) for piece in new.parts[k].pieces])
-    common = shapely.intersection(first, second).area
-    return bool(common >= SAME_OUTLINE_SHARE * first.union(second).area)
+    return compute_overlap(first, second) >= SAME_OUTLINE
 
 
 def is_same_roof(roof: Roof, new: Roof, near_m: float) -> bool:
@@ -239,5 +236,5 @@ def match_parts(old: Building, new: Building) -> dict[int, int]:
 
 def show_parts(roof: Roof, xy: np.ndarray) -> np.ndarray:
     """Return the part (n,) that shows at `xy` (n, 2), -1 beside the roof."""
-    heights, top = find_highest(roof.parts, np.ascontiguousarray(xy))
+    heights, top = find_highest(roof.parts, xy)
     return np.where(np.isfinite(heights), top, -1)

@@ -20,7 +20,6 @@ import shapely
 from ..city.plan.work_plan import WorkPlan, load_plan
 from ..city.work.sort import sort_cloud
 from ..errors import InputWarning
-from ..geometry.components import label_components
 from ..geometry.grid import AROUND_KEYS, KEY_OF_CELL, number_cells
 from ..model import PointCloud
 from ..settings import ReadSettings
@@ -28,7 +27,8 @@ from ..status import ChangeKind
 from ..write.files import atomic_file, save_text
 from ..write.parameters import outline_record
 from .cells import predict_occupancy
-from .clusters import ROUGH_M, is_strip, link_neighbours, measure_roughness
+from .clusters import ROUGH_M, is_strip, label_cells, measure_roughness
+from .kinds import draw_cells
 from .plan import EARLIER_FOLDER
 
 OUTSIDE_FILE, CELLS_FOLDER = "outside.json", "cells"
@@ -203,8 +203,7 @@ def save_roofs_outside(state: Path, plan: WorkPlan, has_earlier: bool, shift: np
     folders = state / CELLS_FOLDER, state / EARLIER_FOLDER / CELLS_FOLDER
     jobs = [job for job in plan.jobs if not job.area.is_empty]
     outlines, names = shapely.STRtree([job.area for job in jobs]), [job.id for job in jobs]
-    found = []
-    files = [list_files(folder) for folder in folders]
+    found, files = [], [list_files(folder) for folder in folders]
     for name, paths in zip(("new", "earlier")[: 1 + has_earlier], files, strict=False):
         if not any(len(np.load(path)["ground"]) for path in paths):
             warnings.warn(
@@ -312,8 +311,7 @@ def describe_roofs(
             share = min(1.0, share / known)  # some cells of bare ground hold no points
             if share < MOSTLY:
                 continue
-        low = find_cells(points[members])
-        place = shapely.union_all(shapely.box(*low.T, *(low + 1).T))
+        place = draw_cells(find_cells(points[members]), 1.0)
         height = measure_height(points[members], ground)
         record = {
             "id": None,
@@ -349,7 +347,7 @@ def group_cells(points: np.ndarray, is_core: np.ndarray, filled: float) -> Itera
     """
     core, keys = np.flatnonzero(is_core), find_keys(points)
     beside = KEY_OF_CELL if filled > SPARSE else TWO_AROUND_KEYS
-    labels = label_components(len(core), link_neighbours(keys[core], beside))
+    labels = label_cells(keys[core], beside)
     for label in np.flatnonzero(np.bincount(labels) >= FEWEST_BEYOND):
         members = core[labels == label]
         grown = np.isin(keys, keys[members, None] + AROUND_KEYS) & ~is_core

@@ -115,7 +115,7 @@ def demolish(earlier: Building) -> Difference:
     """Return the place that a demolished building leaves, in the roof's frame."""
     outline = earlier.roof.outline
     height = earlier.z_ground - float(np.median(earlier.solid.vertices[:, 2]))
-    return Difference(ChangeKind.DEMOLISHED, height, math.nan, outline.area, outline)
+    return Difference(ChangeKind.DEMOLISHED, outline.area, outline, difference_m=height)
 
 
 def place_new(new: Building, was_bare: bool) -> list[dict[str, Any]]:
@@ -124,7 +124,7 @@ def place_new(new: Building, was_bare: bool) -> list[dict[str, Any]]:
         return []
     area = new.roof.world_outline
     height = float(np.median(new.solid.vertices[:, 2]) - new.z_ground)
-    return record_places([Difference(ChangeKind.BUILT, height, math.nan, area.area, area, (-1, 0))])
+    return record_places([Difference(ChangeKind.BUILT, area.area, area, (-1, 0), height)])
 
 
 def record_places(

@@ -204,8 +204,8 @@ class SurveyShift:
         x, y, z = self.xyz
         is_estimated, elsewhere = self.sigma[2] > 0 and not self.doubt, self.roofs - self.agreeing
         is_aside = math.hypot(x, y) > USUAL_ASIDE_M
-        contradicts_ground = not self.doubt and 2 * self.agreeing < self.roofs and self.places
-        contradicts_ground = contradicts_ground and not self.is_contradicted
+        contradicts_ground = bool(self.places) and elsewhere > self.agreeing
+        contradicts_ground &= not (self.doubt or self.is_contradicted)
         doubts = {
             f"{self.doubt}; no shift is taken off. If the survey is shifted, pass it with --shift "
             "EAST,NORTH,UP": self.doubt,

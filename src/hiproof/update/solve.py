@@ -337,7 +337,7 @@ class Updater:
             area_m2 = apart.area / 2  # what is covered now, and was not
         else:
             area_m2 = job.area.area - before.area
-        outline = Difference(kind, math.nan, math.nan, area_m2, apart)
+        outline = Difference(kind, area_m2, apart)
         return self.replace_model(job, member, earlier, verdict, new, outline)
 
     def replace_model(
@@ -370,7 +370,7 @@ class Updater:
             return self.mark(new, Change.NEW, 0.0, place_new(new, is_bare), member)
         one = len(member.predecessors) == 1
         kind = ChangeKind.SPLIT if one else ChangeKind.MERGED
-        place = Difference(kind, math.nan, math.nan, job.area.area, job.area, (-1, 0))
+        place = Difference(kind, job.area.area, job.area, (-1, 0))
         return self.mark(new, Change.CHANGED, 1.0, record_places([place]), member)
 
     def end_predecessors(self, job: Job, member: UpdateMember, new: Building) -> Building:
@@ -379,7 +379,7 @@ class Updater:
             return new
         if not lies_on_ground(new):
             return self.mark(new, Change.NOT_COVERED, 1.0, [], member)
-        place = Difference(ChangeKind.DEMOLISHED, math.nan, math.nan, job.area.area, job.area)
+        place = Difference(ChangeKind.DEMOLISHED, job.area.area, job.area)
         return self.mark(new, Change.GONE, 0.0, record_places([place]), member)
 
     def was_bare(self, job: Job) -> bool:

@@ -48,10 +48,10 @@ def find_unseen(roof: Roof, verdict: ChangeVerdict, new: Surroundings) -> list[D
     place = draw_unseen(roof, verdict.comparison)
     for area in (place, roof.outline if verdict.change is Change.NOT_COVERED else None):
         if area is not None and is_hidden(shapely.transform(area, roof.frame.to_world), new):
-            return [Difference(ChangeKind.UNCLEAR, math.nan, math.nan, area.area, area)]
+            return [Difference(ChangeKind.UNCLEAR, area.area, area)]
     if place is None:
         return []
-    return [Difference(ChangeKind.UNSEEN, math.nan, math.nan, place.area, place)]
+    return [Difference(ChangeKind.UNSEEN, place.area, place)]
 
 
 def draw_unseen(roof: Roof, comparison: CellComparison) -> shapely.Geometry | None:
