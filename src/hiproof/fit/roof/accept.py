@@ -36,7 +36,7 @@ from .price import (
     price_misfit,
     price_roof,
     price_tables,
-    price_widths,
+    price_extents,
     widen,
 )
 from .tables import VOLUME_COUNT, copy_tables, has_room, pack, place_planes
@@ -110,7 +110,7 @@ def try_move(roof, trial, move, site, drawing, known, changed, room, exact):
     units, weight = known.units[0], 1.0
     for box in boxes:
         units += count_known_units(known, widen(box, BESIDE_M))
-    units += price_widths(roof, trial, site) - price_widths(trial, roof, site)
+    units += price_extents(roof, trial, site) - price_extents(trial, roof, site)
     if len(points) > FIRST_JUDGES and not exact and move[0] != SHARE and move[0] != TO_POINTS:
         step = 1 + (len(points) - 1) // FIRST_JUDGES
         weight, points = len(points) / len(points[::step]), points[::step].copy()

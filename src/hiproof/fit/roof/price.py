@@ -17,6 +17,7 @@ from ..prices import (
     LACK_UNITS,
     NARROW_M,
     SKEW_UNITS,
+    SPAN_UNITS,
     UNKNOWN_UNITS,
     VOLUME_UNITS,
 )
@@ -28,6 +29,7 @@ from .draw import (
     draw,
     is_near,
     list_corners,
+    measure_area,
     meets,
     widen_box,
 )
@@ -41,7 +43,7 @@ DAMPING = 0.05  # Points that hold an unknown at its value.
 Site = namedtuple(
     "Site",
     "x y z weight shade n low high dead width unit parts part_sizes part_boxes lines bays "
-    "bay_heights bounds narrow keeps_shapes",
+    "bay_heights bounds area narrow keeps_shapes",
 )
 """What the roof of a building has to explain.
 
@@ -52,7 +54,7 @@ Site = namedtuple(
 - parts (p, c, 2), part_sizes (p,), part_boxes (p, 4): convex parts of the outline.
 - lines (m, 6): lines of the outline, as `site.list_outline_lines` says.
 - bays (b, 4, 3), bay_heights (b,): sides and heights of places that a wall cuts off.
-- bounds (4,): least and greatest x and y of the outline.
+- bounds (4,): least and greatest x and y of the outline. area: its area (m2).
 - narrow: a volume is narrow below this width (m).
 - keeps_shapes: whether volumes keep their planes, because not all types may be built.
 """
@@ -61,7 +63,7 @@ Known = namedtuple("Known", "costs corners steps units")
 """What is known of a roof as it is.
 
 What each point and cell costs (n + g,), where its corners (c, 2) are, its steps (s, 3) with the
-units of each, and the units (2,) of its tables and of what its volumes lack in width.
+units of each, and the units (2,) of its tables and of how far its volumes extend.
 """
 
 
@@ -198,8 +200,8 @@ def widen(box, reach):
 
 
 @compiled
-def price_widths(roof, other, site):
-    """Return the units of what a roof's volumes lack in width, but those with sides as in `other`.
+def price_extents(roof, other, site):
+    """Return the units of how far a roof's volumes extend, but those with sides as in `other`.
 
     Volumes of one number are compared.
     """
@@ -209,31 +211,34 @@ def price_widths(roof, other, site):
         for s in range(N_SIDES):
             is_same &= roof.sides[k, s] == other.sides[k, s]
         if roof.n_planes[k] > 0 and not is_same:
-            total += price_lack(roof, k, site)
+            total += price_extent(roof, k, site)
     return total
 
 
 @compiled
-def price_lack(roof, k, site):
-    """Return the units of what volume k lacks in width inside the outline."""
-    plan, room = np.empty((RING_CORNERS, 2)), np.empty((RING_CORNERS, 2))
+def price_extent(roof, k, site):
+    """Return the units of volume k's area inside the outline, and of what it lacks in width."""
+    plan, room, area = np.empty((RING_CORNERS, 2)), np.empty((RING_CORNERS, 2)), 0.0
     low, high = np.full(2, np.inf), np.full(2, -np.inf)
     for part in range(len(site.part_sizes)):
         box = site.part_boxes[part]
         if not meets(roof.boxes[k], box[0], box[1], box[2], box[3]):
             continue
-        for i in range(cut_part(roof, k, site, part, plan, room)):
+        size = cut_part(roof, k, site, part, plan, room)
+        area += measure_area(plan, size) if size > 0 else 0.0
+        for i in range(size):
             for axis in range(2):
                 half = roof.half_planes[k, 2 * axis]
                 across = half[0] * plan[i, 0] + half[1] * plan[i, 1]
                 low[axis], high[axis] = min(low[axis], across), max(high[axis], across)
     narrow = 0 if high[0] - low[0] < high[1] - low[1] else 1
     first, second = abs(roof.sides[k, 2 * narrow]) - 1, abs(roof.sides[k, 2 * narrow + 1]) - 1
-    lack = site.narrow - (high[narrow] - low[narrow])
+    lack, units = site.narrow - (high[narrow] - low[narrow]), SPAN_UNITS * area / site.area
     if not 0.0 < lack < site.narrow:
-        return 0.0
+        return units
     is_given = roof.lines[first, 3] + roof.lines[second, 3] == 0.0
-    return (GIVEN_UNITS if is_given else LACK_UNITS) * lack * (high[1 - narrow] - low[1 - narrow])
+    lack *= high[1 - narrow] - low[1 - narrow]
+    return units + (GIVEN_UNITS if is_given else LACK_UNITS) * lack
 
 
 @compiled
@@ -253,11 +258,11 @@ def count_skew_planes(roof, k):
 
 @compiled
 def price_all_units(roof, site):
-    """Return the units (2,) of a roof's tables and of what its volumes lack in width."""
-    lack = 0.0
+    """Return the units (2,) of a roof's tables and of how far its volumes extend."""
+    extents = 0.0
     for k in range(roof.counts[VOLUME_COUNT]):
-        lack += price_lack(roof, k, site) if roof.n_planes[k] > 0 else 0.0
-    return np.array([price_tables(roof), lack])
+        extents += price_extent(roof, k, site) if roof.n_planes[k] > 0 else 0.0
+    return np.array([price_tables(roof), extents])
 
 
 @compiled
