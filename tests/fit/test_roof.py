@@ -130,6 +130,18 @@ def test_the_slope_between_two_dormers_is_no_part(seed):
     assert len(parts) == 3
 
 
+@pytest.mark.parametrize("seed", [111, 322])  # of 330, those that were an asymmetric gable
+def test_a_dormer_that_ends_at_the_far_slope_is_no_gable(seed):
+    parts = fit_building(*scan_compound("dormered", seed, 5.0)).roof_parts
+    assert [part.type for part in parts if part.type not in ("gable", "hip")] == ["monopitch"]
+
+
+def test_no_house_of_a_row_runs_on_beneath_the_others():
+    points, outline = scan_compound("row", 13, 5.0)  # one was drawn out over six tenths of the row
+    parts = fit_building(points, outline).roof_parts
+    assert sum(part.area for part in parts) < 1.01 * outline.area
+
+
 @pytest.mark.parametrize("kind", COMPOUND_KINDS)
 def test_a_drawing_shows_at_each_place_the_plane_that_is_visible_there(kind):
     roof, site, outline, _ = begin_roof(kind)

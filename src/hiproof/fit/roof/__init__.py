@@ -120,8 +120,7 @@ def draw_parts(volumes: np.ndarray, whole: Whole, settings: Settings) -> tuple[l
 def find_roof(volumes: np.ndarray, whole: Whole, site: Site) -> tuple[Tables, float]:
     """Find a roof that no move makes cheaper, and its price (points).
 
-    It begins with volumes (k, COLUMNS). More are added where points are unexplained, if the search
-    has not seen all of them.
+    It begins with volumes (k, COLUMNS). More are added where points are unexplained.
     """
     roof = start_roof(volumes, whole.turn, site)
     trial, drawing = make_tables_like(roof), make_drawing(len(roof.sides))

@@ -32,11 +32,11 @@ from .price import (
     list_unknowns,
     list_view,
     price_drawing,
+    price_extents,
     price_known,
     price_misfit,
     price_roof,
     price_tables,
-    price_extents,
     widen,
 )
 from .tables import VOLUME_COUNT, copy_tables, has_room, pack, place_planes

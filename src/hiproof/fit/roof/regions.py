@@ -105,7 +105,7 @@ def end_at_others(
                 owners[seen] = j, planes[j][0]
                 continue
             is_of_side = abs(roof.plane_lines[k, p]) in np.abs(roof.sides[k])
-            may_end = others and not is_of_side or not len(seen) and len(planes[k]) > 2
+            may_end = (others and not is_of_side) or (not len(seen) and len(planes[k]) > 2)
             if not may_end:
                 continue
             shown = unite([area for j, q in others for area in draw_lowest(roof, j, q, regions[j])])
