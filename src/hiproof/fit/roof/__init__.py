@@ -41,7 +41,7 @@ from ..union.depth import VISIBLE_DEPTH_M
 from ..union.fit import BuildingFit
 from ..union.outline import draw_outline
 from ..union.plan import Plan, lay_out_plan
-from ..union.search import find_volumes
+from ..union.search import count_search_points, find_volumes
 from ..union.whole import Whole, lay_out_whole
 from .accept import LOOP_ROUNDS, improve
 from .add import add_volumes
@@ -120,12 +120,15 @@ def draw_parts(volumes: np.ndarray, whole: Whole, settings: Settings) -> tuple[l
 def find_roof(volumes: np.ndarray, whole: Whole, site: Site) -> tuple[Tables, float]:
     """Find a roof that no move makes cheaper, and its price (points).
 
-    It begins with volumes (k, COLUMNS). More are added where points are unexplained.
+    It begins with volumes (k, COLUMNS). More are added where points are unexplained, if the search
+    has not seen all of them.
     """
     roof = start_roof(volumes, whole.turn, site)
     trial, drawing = make_tables_like(roof), make_drawing(len(roof.sides))
     price = improve(roof, trial, site, drawing, np.ones(len(roof.sides), np.bool_), LOOP_ROUNDS)
-    if (added := add_volumes(roof, trial, site, drawing, whole)).any():
+    # Else the search has seen every point.
+    is_thinned = whole.plan.uvz.shape[1] > count_search_points(whole.outline.area)
+    if is_thinned and (added := add_volumes(roof, trial, site, drawing, whole)).any():
         price = improve(roof, trial, site, drawing, added, LOOP_ROUNDS)
     return roof, price
 

@@ -1,8 +1,9 @@
 """Add volumes where a roof leaves points unexplained.
 
-The search takes some of the points, and another price. Where many are unexplained, planes are found
-among these, each with the rectangle in which it gains most, and volumes nearby are copied. A new
-volume joins the others or replaces them. It is kept if the roof with it, improved, is cheaper.
+The search takes some of the points of a large or dense roof. Where many are unexplained, planes
+are found again among these, each with the rectangle in which it gains most, and volumes nearby are
+copied. A new volume joins the others or replaces them. It is kept if the roof with it, improved, is
+cheaper.
 """
 
 from __future__ import annotations

@@ -34,6 +34,11 @@ def find_volumes(whole: Whole) -> np.ndarray:
     return make_base(float(z[(len(z) - 1) // 2]))
 
 
+def count_search_points(area_m2: float) -> int:
+    """Return how many points of a block are searched at most."""
+    return HOUSE_POINTS if area_m2 <= LARGEST_HOUSE_M2 else BLOCK_POINTS
+
+
 def search_box(whole: Whole, raster: HeightRaster, box: Box, area_m2: float) -> list[np.ndarray]:
     """Return the volumes of each block of a box that holds so much of the outline."""
     cut = find_cheapest_cut(raster, box) if area_m2 > BLOCK_M2 else None
@@ -72,7 +77,7 @@ def search_block(whole: Whole, box: Box, area_m2: float) -> list[np.ndarray]:
 
     It is searched by itself, its own base first. The list is empty for hardly a point.
     """
-    most = HOUSE_POINTS if area_m2 <= LARGEST_HOUSE_M2 else BLOCK_POINTS
+    most = count_search_points(area_m2)
     scene = full = open_window(whole, box, most)
     if scene is not None and scene.n == most:
         full = open_window(whole, box, FULL_POINTS)
