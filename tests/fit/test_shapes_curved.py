@@ -22,7 +22,6 @@ from hiproof.write.parameters import building_record
 from points_of_roofs import sample_heights, sample_roof, typical_theta
 
 PLANAR = [name for name in CATALOGUE if name not in CURVED]
-ONIONS_ON_TOWERS = range(10, 22)
 
 
 @cache
@@ -132,7 +131,7 @@ def test_an_onion_on_a_tower_is_as_high_as_it_is():
 
     Of 40 seeds, the type is right in 35, and the height within 0.2 m too in 29.
     """
-    outcomes = [judge_parts(*fit_scene("onion", "tower", seed)) for seed in ONIONS_ON_TOWERS]
+    outcomes = [judge_parts(*fit_scene("onion", "tower", seed)) for seed in range(12)]
     assert sum(outcome.is_right for outcome in outcomes) >= 8
     near = [outcome.is_right and abs(outcome.height_error_m) <= 0.2 for outcome in outcomes]
     assert sum(near) >= 6
@@ -299,17 +298,17 @@ def is_refit_near(kind, setting, seed):
 
 
 MEASURED = [
-    ("onion", "tower", ONIONS_ON_TOWERS),
-    ("cone", "turret", range(16, 24)),
-    ("hexagonal_spire", "turret", range(16, 24)),
-    ("barrel", "alone", range(16, 24)),
+    ("onion", "alone"),
+    ("cone", "turret"),
+    ("hexagonal_spire", "tower"),
+    ("barrel", "alone"),
 ]
 
 
-@pytest.mark.parametrize(("kind", "setting", "seeds"), MEASURED)
-def test_errors_of_curved_parts_are_a_few_standard_deviations(kind, setting, seeds):
+@pytest.mark.parametrize(("kind", "setting"), MEASURED)
+def test_errors_of_curved_parts_are_a_few_standard_deviations(kind, setting):
     scores = []
-    for seed in seeds:
+    for seed in range(16, 24):
         scene, parts = fit_scene(kind, setting, seed)
         of_kind = [part for part in parts if part.type == kind]
         if len(of_kind) != 1:  # another shape in one of eight, of which the benchmark tells
@@ -317,7 +316,7 @@ def test_errors_of_curved_parts_are_a_few_standard_deviations(kind, setting, see
         (part,) = of_kind
         true, _, _ = CATALOGUE[kind].from_theta(scene.theta)
         scores.append((part.parameters["height"] - true["height"]) / part.sigma["height"])
-    assert len(scores) >= len(seeds) - 1
+    assert len(scores) >= 7
     # the median, for one vault in eight is another
     assert 1.48 * np.median(np.abs(scores)) == pytest.approx(1.0, abs=0.55)
 
