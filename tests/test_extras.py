@@ -14,6 +14,7 @@ from click.testing import CliRunner
 
 import hiproof
 import hiproof.learn
+from hiproof import method
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.city.work.warm import compile_half
 from hiproof.edit.points import RunPoints
@@ -215,10 +216,19 @@ def test_the_page_says_at_once_that_a_terrain_model_cannot_be_read(
     assert "all but refitting works (expected the package rasterio" in RunPoints(out).missing
 
 
-def test_without_the_network_all_is_compiled_beforehand(hide_package):
+def test_without_the_network_all_is_compiled_beforehand(hide_package, monkeypatch):
     """A core install has none: the process ended there, and each run started it again."""
     hide_package("onnxruntime")
+    fits, reconstruct = [], method.reconstruct
+
+    def note_fit(*arguments, settings):
+        fits.append((settings.fit.parts, settings.segment.network))
+        return reconstruct(*arguments, settings=settings)
+
+    monkeypatch.setattr(method, "reconstruct", note_fit)
     compile_half("all")
+    assert [network for parts, network in fits if parts == "one"] == ["never", "never"]
+    assert len(fits) == 4  # it came to its end
 
 
 def test_the_demo_asks_for_no_extra(tmp_path):
