@@ -15,7 +15,7 @@ import shapely
 
 from ..errors import InputError
 from ..log import count_things
-from ..parametric.file import DAMAGED, located_parameters, read_at
+from ..parametric.file import DAMAGED, locate_parameters, read_at
 from ..parametric.record import refuse_other_kinds
 from ..read.models.damage import SkippedBuildings
 from ..settings import Settings
@@ -170,7 +170,7 @@ class RunFolder:
 
 def read_rows(path: Path) -> tuple[FileHead, list[BuildingRow]]:
     """Read the head of the parameters at `path`, and a row a building."""
-    with located_parameters(path, SkippedBuildings()) as (head, located):
+    with locate_parameters(path, SkippedBuildings()) as (head, located):
         return head, [read_row(*place) for place in located if place[1] is not DAMAGED]
 
 

@@ -18,7 +18,7 @@ from ..errors import HiproofError, InputError
 from ..masking import mask
 from ..model import Building
 from ..parametric.building import build
-from ..parametric.file import located_parameters, opened_parameters, read_at
+from ..parametric.file import locate_parameters, opened_parameters, read_at
 from ..status import Status
 from ..write.head import FileHead
 from ..write.naming import UniqueNames, gml_name
@@ -59,7 +59,7 @@ def index_records(path: Path, use_attribute: str = "") -> Index:
     attributes: dict[str, None] = {}
     uses: dict[str, None] = {}
     names, renamed = UniqueNames(), {}
-    with located_parameters(path) as (_, located):
+    with locate_parameters(path) as (_, located):
         for place, record in located:
             id = plain_text(record["id"])
             if id in ids:

@@ -42,12 +42,12 @@ def opened_parameters(
     Buildings come one by one. A line that cannot be read is told to `damaged`, which refuses the
     file by default, and comes as DAMAGED. Raises InputError for a file that is no parameters.jsonl.
     """
-    with located_parameters(path, damaged) as (head, located):
+    with locate_parameters(path, damaged) as (head, located):
         yield head, (record for _, record in located)
 
 
 @contextmanager
-def located_parameters(
+def locate_parameters(
     path: str | os.PathLike[str], damaged: Damaged = refuse
 ) -> Iterator[tuple[FileHead, Iterator[tuple[int, dict[str, Any]]]]]:
     """Do as `opened_parameters`, with the place of each building for `read_at`."""

@@ -13,14 +13,14 @@ from typing import Any
 import numpy as np
 import shapely
 
-from ..compose.settle import PLAN_DIGITS
+from ..compose.settle import DIGITS, PLAN_DIGITS
 from ..errors import HiproofError
 from ..geometry.rings import repair_polygons
 from ..model import Building, Piece, Roof
 from ..model.heights import find_highest
 from ..parametric.building import build
 from ..parametric.refit import measure_building, select_inside
-from ..write.parameters import LENGTH_DIGITS, building_record
+from ..write.parameters import building_record
 from .members import SAME_OUTLINE, compute_overlap
 
 PART_GRID_M = 0.5  # of the places where parts are compared
@@ -147,8 +147,8 @@ def lift_part(before: dict[str, Any], height: float, sigma_m: float | None) -> d
     x, y, z = before["position"]
     sigma = {name: v for name, v in (before.get("sigma") or {}).items() if name != "t_z"}
     if sigma_m is not None:
-        sigma["t_z"] = round(sigma_m, LENGTH_DIGITS)
-    return before | {"position": [x, y, round(z + height, LENGTH_DIGITS)], "sigma": sigma}
+        sigma["t_z"] = round(sigma_m, DIGITS)
+    return before | {"position": [x, y, round(z + height, DIGITS)], "sigma": sigma}
 
 
 def has_same_outline(old: Building, j: int, new: Building, k: int) -> bool:
@@ -190,7 +190,7 @@ def move_record(record: dict[str, Any], origin: np.ndarray) -> None:
 
     record["origin"], record["outline"] = origin.tolist(), move_rings(record["outline"])
     for part in record["parts"]:
-        part["position"] = np.round(np.array(part["position"]) + shift, LENGTH_DIGITS).tolist()
+        part["position"] = np.round(np.array(part["position"]) + shift, DIGITS).tolist()
         part["outlines"] = [move_rings(rings) for rings in part["outlines"]]
 
 

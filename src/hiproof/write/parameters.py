@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import shapely
 
-from ..compose.settle import round_number
+from ..compose.settle import DIGITS, round_number
 from ..model import Building, Model, Part
 from .attribute_list import TABLES
 from .fragments import Fragment, Sheet
@@ -27,7 +27,6 @@ from .values import dump, plain, plain_text
 from .writer import BuildingWriter
 
 VERSION = 1  # of the file's layout; one that is not known is refused
-LENGTH_DIGITS = 6  # micrometres and millionths of a degree
 
 
 def write_parameters(
@@ -217,7 +216,7 @@ def by_name(values: dict[str, float]) -> dict[str, float | None]:
     return {str(name): number(value) for name, value in values.items()}
 
 
-def number(value: float, digits: int = LENGTH_DIGITS) -> float | None:
+def number(value: float, digits: int = DIGITS) -> float | None:
     """Round a number; None for NaN and infinities, which JSON does not know."""
     return round_number(value, digits) if math.isfinite(value) else None
 
@@ -226,7 +225,7 @@ def places(xyz: np.ndarray) -> list[list[float | None]]:
     """Return a line (m, 3) as `numbers` of vertices, at once where all are known."""
     if not np.isfinite(xyz).all():
         return [numbers(place) for place in xyz.tolist()]
-    return (np.round(xyz, LENGTH_DIGITS) + 0.0).tolist()
+    return (np.round(xyz, DIGITS) + 0.0).tolist()
 
 
 def numbers(values: Iterable[float]) -> list[float | None]:

@@ -21,6 +21,7 @@ from ..union.candidates import (
 from ..union.grow import prepare_growth
 from ..union.objective import compute_costs
 from ..union.scene import Scene, open_window
+from ..union.search import BLOCK_POINTS
 from ..union.volumes import DIRECTION, REPLACES, U0
 from ..union.whole import Box, Whole
 from .accept import LEAST_UNITS, improve_new
@@ -35,7 +36,6 @@ AROUND = 2  # Squares around one that count, too.
 MOST_PLACES = 10  # Most places of a roof that are tried: a limit on time.
 PLACE_UNITS = 4.0  # Units that the points must be worth that a place leaves unexplained.
 WINDOW_M = 20.0  # Size (m) of a place's window.
-WINDOW_POINTS = 1600  # Most points of it.
 TRIED = 2  # Candidates that join, and that replace, those that gain most.
 ROWS = np.array([1, 16, 16])  # Most volumes, lines and unknowns that a new volume takes.
 
@@ -49,7 +49,7 @@ def add_volumes(
     """
     known, windows = know(roof, drawing, site), []
     for box in list_places(roof, site):
-        scene, start, last = open_window(whole, box, WINDOW_POINTS), known, None
+        scene, start, last = open_window(whole, box, BLOCK_POINTS), known, None
         while scene is not None and known is not last:
             last, known = known, add_best(roof, trial, site, drawing, scene, box, known)
         if known is not start:
