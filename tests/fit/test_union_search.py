@@ -9,7 +9,6 @@ from hiproof.fit.prices import (
     PART_COST,
     REPLACING_COST,
     SKEW_UNITS,
-    SLACK_UNITS,
     UNKNOWN_UNITS,
 )
 from hiproof.fit.union.add import NOTHING_LEFT, add_candidates, find_best_addition
@@ -44,12 +43,6 @@ from hiproof.fit.union.objective import (
     compute_objective_with,
 )
 from hiproof.fit.union.refit import refit
-from hiproof.fit.union.trim import (
-    NEAR_VERTEX_M,
-    draw_in,
-    draw_out,
-    trim,
-)
 from hiproof.fit.union.volumes import (
     DIRECTION,
     FREE,
@@ -316,93 +309,6 @@ def test_a_move_gives_the_true_objective_and_never_a_higher_one(move, seed):
     moved, result = MOVES[move](volumes.copy(), scene, value)
     assert result <= value + 1e-9
     assert is_true(moved, scene, result)
-
-
-def list_cells(scene):
-    """Return the unobserved cells of a scene: U, V (directions, g)."""
-    return scene.U[:, scene.n :], scene.V[:, scene.n :]
-
-
-@pytest.mark.parametrize("seed", SEEDS)
-def test_a_hidden_edge_is_drawn_in_where_no_height_changes(seed):
-    rng, volumes, scene = draw_case(seed)
-    value, (U, V) = compute_objective(volumes, scene), list_cells(scene)
-    for k in range(1, len(volumes)):
-        for edge in (U0, U0 + 1, U0 + 2, V1):
-            seen_to = rng.uniform(
-                volumes[k, edge - (edge - U0) % 2], volumes[k, edge - (edge - U0) % 2 + 1]
-            )
-            trial, result = draw_in(volumes, scene, value, k, edge, seen_to, U, V)
-            assert is_true(trial, scene, result)
-            heights, before = (compute_roof_heights(rows, U, V)[0] for rows in (trial, volumes))
-            assert np.array_equal(heights, before)
-
-
-@pytest.mark.parametrize("seed", SEEDS)
-def test_an_edge_is_drawn_out_to_a_corners_line_for_next_to_nothing_or_stays(seed):
-    _, volumes, scene = draw_case(seed)
-    value = compute_objective(volumes, scene)
-    outwards, result = draw_out(volumes, scene, value)
-    assert (
-        is_true(outwards, scene, result)
-        and result <= value + 4 * len(volumes) * SLACK_UNITS * scene.unit
-    )
-    assert np.array_equal(
-        np.delete(outwards, range(U0, V1 + 1), 1), np.delete(volumes, range(U0, V1 + 1), 1)
-    )
-    further = (outwards[1:, U0 : V1 + 1] - volumes[1:, U0 : V1 + 1]) * [-1.0, 1.0, -1.0, 1.0]
-    assert (further >= 0.0).all() and (further < NEAR_VERTEX_M).all()
-
-
-def test_a_rectangle_just_short_of_the_outline_is_drawn_out_to_it():
-    scene = draw_scene(np.random.default_rng(0))
-    lower, *_, upper = sorted(x for x in scene.vertices[0, 0] if np.isfinite(x))
-    true = np.vstack([make_base(-50.0), draw_tied_volume(np.random.default_rng(0))])
-    true[1, U0 : U0 + 2] = lower, upper
-    scene = scene._replace(z=compute_heights(true, scene.U, scene.V)[0])
-    short = true.copy()
-    short[1, U0 : U0 + 2] += 0.2, -0.1
-    result, _ = draw_out(short, scene, compute_objective(short, scene))
-    assert result[1, U0 : U0 + 2].tolist() == pytest.approx([lower, upper])
-
-
-@pytest.mark.parametrize("seed", SEEDS)
-def test_trimming_gives_the_true_objective_and_no_volume_reaches_further_than_before(seed):
-    _, volumes, scene = draw_case(seed)
-    trimmed, result = trim(
-        volumes.copy(), scene, compute_objective(volumes, scene), *list_cells(scene)
-    )
-    assert is_true(trimmed, scene, result)
-    planes = {tuple(row[OFFSET0 : OFFSET0 + N_PLANES]): row for row in volumes}
-    for row in trimmed:
-        original = planes[tuple(row[OFFSET0 : OFFSET0 + N_PLANES])]
-        assert (row[[U0, U0 + 2]] >= original[[U0, U0 + 2]] - NEAR_VERTEX_M).all()
-        assert (row[[U0 + 1, V1]] <= original[[U0 + 1, V1]] + NEAR_VERTEX_M).all()
-
-
-@pytest.mark.parametrize("seed", SEEDS)
-def test_a_volume_that_shows_at_one_line_of_nodes_keeps_its_width(seed):
-    """Both its edges are near the neighbour's edge.
-
-    Drawn in to it they would leave a line.
-    """
-    scene = draw_scene(np.random.default_rng(seed))
-    _, V = list_cells(scene)
-    line = float(np.sort(V[0])[V.shape[1] // 2])
-    lower, upper = make_level(-8.0, line - 0.05, 3.0), make_level(line + 0.01, 8.0, 3.0)
-    middle = make_level(line - 1.0, line + 1.0, 2.0)
-    volumes = np.vstack([make_base(-50.0), middle, lower, upper])
-    scene = scene._replace(z=compute_heights(volumes, scene.U, scene.V)[0])
-    result, _ = trim(volumes, scene, compute_objective(volumes, scene), *list_cells(scene))
-    assert (result[:, U0] < result[:, U0 + 1]).all()
-    assert (result[:, V0] < result[:, V1]).all()
-
-
-def make_level(lower, upper, height):
-    """Make a level volume from v = `lower` to v = `upper`."""
-    row = make_base(height)[0]
-    row[U0 : V1 + 1] = -8.0, 8.0, lower, upper
-    return row
 
 
 # --- planes and candidates ------------------------------------------------------------------------

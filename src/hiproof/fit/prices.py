@@ -34,7 +34,6 @@ LEAN_UNITS = 1.0  # A line with a direction of its own.
 CORNER_UNITS = 0.3  # A corner of the drawn roof, at any level.
 LOW_STEP_UNITS = 0.23  # A metre of a step lower than half a metre.
 NARROW_M = 1.0  # Nobody draws what is narrower (m).
-SPAN_UNITS = 0.2  # A volume under all of the roof: what is hidden reaches no further than it must.
 LACK_UNITS = 4.0  # A m2 that a volume lacks to be as wide: what its points would explain.
 GIVEN_UNITS = 1.0  # The same between two lines of the outline.
 NARROW_UNITS = 0.6  # A metre of a step beside a narrower strip, unless it runs along a wall.
@@ -69,10 +68,6 @@ KIND_COST = np.array([1.0, 1.4, 1.4, 1.9])
 
 FREE_UNITS, FREELY_UNITS = 1.5, 8.0  # a plane that faces no wall; a new volume with such a plane
 REGROWN_UNITS = 0.5  # a roof grown anew: less is gained by cutting finer, too
-
-# What a change may cost that a draughtsman would make, in units.
-
-SLACK_UNITS = 0.02  # drawing a hidden edge in: what is hidden explains nothing
 
 # How far above the best a change may begin and still become the best, in units.
 

@@ -20,9 +20,13 @@ from .tables import (
     VOLUME_COUNT,
     VOLUME_PLANES,
     Tables,
+    add_line,
     find_lowest_plane,
+    has_room,
+    place_volume,
 )
 
+HIDDEN_M = 0.25  # A volume reaches so far (m) below what hides it, and no further.
 RING_CORNERS = 40  # Most corners of a fragment.
 MOST_FRAGMENTS = 4000  # Most fragments of what is drawn at once.
 PIECE_ROOM = 200  # Most fragments of one plane in one piece of the outline.
@@ -317,6 +321,25 @@ def draw_whole_roof(roof: Tables, site) -> Drawing:
     everywhere = np.array([-np.inf, np.inf, -np.inf, np.inf])
     draw(roof, drawing, np.arange(roof.counts[VOLUME_COUNT]), site, everywhere)
     return drawing
+
+
+@compiled
+def draw_in(roof, drawing):
+    """Draw in the sides of a drawn roof's volumes that reach far below what hides them."""
+    hidden = np.full((roof.counts[VOLUME_COUNT], N_SIDES), FAR_M)
+    for f in range(drawing.count[0]):
+        k = drawing.owners[f, 0]
+        for s in range(N_SIDES):
+            a, b, c = roof.half_planes[k, s]
+            for i in range(drawing.sizes[f]):
+                x, y = drawing.rings[f, i]
+                hidden[k, s] = min(hidden[k, s], a * x + b * y + c)
+    for k in range(len(hidden)):
+        for s in range(N_SIDES):
+            if HIDDEN_M < hidden[k, s] < 0.5 * FAR_M and has_room(roof):
+                a, b, c = roof.half_planes[k, s]
+                roof.sides[k, s] = add_line(roof, a, b, c - hidden[k, s] + HIDDEN_M)
+        place_volume(roof, k)
 
 
 @compiled

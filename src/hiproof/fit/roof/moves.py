@@ -23,6 +23,7 @@ from .tables import (
     add_line,
     add_plane,
     add_unknown,
+    cross_lines,
     drop_plane,
     find_lowest_plane,
     measure_middle,
@@ -130,8 +131,6 @@ def list_moves(roof, site, asked, moves):
 
 @compiled
 def list_merges(roof, site, j, k, moves, count):
-    if roof.replaces[j] != roof.replaces[k]:
-        return count
     first, second, third = (
         roof.half_planes[j, 0],
         roof.half_planes[k, 0],
@@ -147,6 +146,11 @@ def list_merges(roof, site, j, k, moves, count):
         if roof.n_planes[j] != roof.n_planes[k] or not has_alike(roof, j, k):
             count = write_move(moves, count, MERGE, j, k, 0, 0)
             count = write_move(moves, count, MERGE, k, j, 0, 0)
+        return count
+    if has_alike(roof, j, k):
+        count = write_move(moves, count, MERGE, j, k, 0, 0)
+    if has_alike(roof, k, j):
+        count = write_move(moves, count, MERGE, k, j, 0, 0)
     return count
 
 
@@ -375,8 +379,9 @@ def apply_move(roof, move, site, changed):
         is_possible = line != 0
         roof.sides[a, b] = line if is_possible else roof.sides[a, b]
     elif kind == MERGE:
-        is_possible = roof.n_planes[b] > 0 and merge(roof, a, b, site, d)
-        changed[b] = True
+        is_possible, changed[b] = roof.n_planes[b] > 0, True
+        if is_possible:
+            merge(roof, a, b, site, d)
         if is_possible and c:  # the same merge, if no plane turns
             is_possible = face_planes(roof, a, c, site)
     elif kind == FACE:
@@ -543,7 +548,7 @@ def merge(roof, a, b, site, takes_planes):
             if half[0] * other[0] + half[1] * other[1] > SAME_DIRECTION:
                 best = roof.sides[b, t]
         if best == 0:
-            return False
+            best = run_over(roof, a, s, b)
         x, y, length = measure_middle(roof, a, s, site.bounds)
         e, f, g = read_line(roof, best)
         if length > 0.0 and e * x + f * y + g > 0.0:
@@ -552,7 +557,18 @@ def merge(roof, a, b, site, takes_planes):
         if not has_alike_plane(roof, a, b, p):
             add_plane(roof, a, roof.plane_lines[b, p], roof.heights[b, p], roof.slopes[b, p])
     roof.n_planes[b] = 0
-    return True
+
+
+@compiled
+def run_over(roof, a, s, b):
+    """Return a line along side s of volume a that lies beyond all corners of volume b."""
+    c, d, e = read_line(roof, roof.sides[a, s])
+    beyond = 0.0
+    for t in range(2):
+        for u in range(2, N_SIDES):
+            x, y = cross_lines(roof, roof.sides[b, t], roof.sides[b, u])
+            beyond = min(beyond, c * x + d * y + e)
+    return add_line(roof, c, d, e - beyond)
 
 
 @compiled

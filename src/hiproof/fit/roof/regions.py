@@ -104,13 +104,15 @@ def end_at_others(
                 ended |= {j, k}
                 owners[seen] = j, planes[j][0]
                 continue
+            own = draw_lowest(roof, k, p, regions[k])
             is_of_side = abs(roof.plane_lines[k, p]) in np.abs(roof.sides[k])
             may_end = (others and not is_of_side) or (not len(seen) and len(planes[k]) > 2)
-            if not may_end:
+            if own and not may_end:
                 continue
             shown = unite([area for j, q in others for area in draw_lowest(roof, j, q, regions[j])])
-            own = draw_lowest(roof, k, p, regions[k])
-            if own and subtract(unite_fragments(drawing, seen.tolist()), shown).area <= FRAGMENT_M2:
+            if not own:
+                planes[k].remove(p)
+            elif subtract(unite_fragments(drawing, seen.tolist()), shown).area <= FRAGMENT_M2:
                 other = np.flatnonzero((owners[:, 0] == k) & (owners[:, 1] != p)).tolist()
                 visible = unite_fragments(drawing, other)
                 regions[k] = cut_square(unite(regions[k]), unite(own), roof.planes[k, p], visible)

@@ -19,6 +19,7 @@ from ..union.volumes import (
     U0,
     V1,
 )
+from .draw import draw_in, draw_whole_roof
 from .ends import find_end
 from .moves import LINE_COSINE
 from .price import Site, list_points, list_view, price_misfit, widen
@@ -50,6 +51,7 @@ def start_roof(volumes: np.ndarray, turns: np.ndarray, site: Site) -> Tables:
     roof = make_tables(size, 8 * size, 8 * size)
     for volume in volumes:
         add_volume(roof, volume, turns)
+    draw_in(roof, draw_whole_roof(roof, site))
     for k in range(len(volumes)):
         put_on_walls(roof, k, site, False)
     return roof
@@ -99,7 +101,7 @@ def put_on_walls(roof, k, site, is_new):
         reach = NEAR_WALL_M + MOST_SWING * length
         boxes = widen(roof.boxes[k], reach).reshape(1, 4)
         view, points = list_view(roof, boxes), list_points(site, boxes)
-        start = best = roof.sides[k, s]
+        best = roof.sides[k, s]
         lowest = price_misfit(roof, site, view, points) + site.unit * LOOSE_UNITS
         for line in site.lines:
             cosine, gap = a * line[0] + b * line[1], abs(line[0] * x + line[1] * y + line[2])
@@ -115,25 +117,22 @@ def put_on_walls(roof, k, site, is_new):
             else:
                 roof.counts[LINE_COUNT] = count
         roof.sides[k, s] = best
-        move_eaves(roof, k, start, best)
+        move_eaves(roof, k, best)
         place_volume(roof, k)
 
 
 @compiled
-def move_eaves(roof, k, line, other):
-    """Let the planes of volume k that rise from a line rise from another, parallel to it.
+def move_eaves(roof, k, line):
+    """Let the planes of volume k that rise from lines parallel to a side's line rise from it.
 
     They stay where they are.
     """
     a, b, c = read_line(roof, line)
-    d, e, f = read_line(roof, other)
-    if a * d + b * e < PARALLEL_COSINE:
-        return
     for p in range(roof.n_planes[k]):
-        if roof.plane_lines[k, p] == line:
-            roof.plane_lines[k, p] = other
-            if roof.slopes[k, p] >= 0:
-                roof.values[roof.heights[k, p]] += roof.values[roof.slopes[k, p]] * (c - f)
+        d, e, f = read_line(roof, roof.plane_lines[k, p])
+        if roof.slopes[k, p] >= 0 and a * d + b * e >= PARALLEL_COSINE:
+            roof.plane_lines[k, p] = line
+            roof.values[roof.heights[k, p]] += roof.values[roof.slopes[k, p]] * (f - c)
 
 
 def add_planes(roof: Tables, row: int, volume: np.ndarray, axes: np.ndarray) -> None:

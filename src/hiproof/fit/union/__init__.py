@@ -22,7 +22,6 @@ moves       compiled: moves that change one volume
 facings     compiled: moves that turn its planes
 improve     compiled: all moves in turn
 add, grow   volumes added one by one to a level base, and the first one grown anew
-trim        hidden edges drawn in
 search      these in order, block by block
 fit         the outcome
 """

@@ -73,7 +73,8 @@ def open_window(whole: Whole, box: Box, most_points: int) -> Scene | None:
     most = max(LEAST_CELLS, math.isqrt(n))
     lines = [line for turned in corners for line in lay_grid(turned, n / part.area, most)]
     cells = lay_unobserved_cells(whole, lines[0], lines[1], np.array([u, v, z]), n / part.area)
-    U, V = turn_to_directions(whole, np.r_[u, cells[0]], np.r_[v, cells[1]])
+    u, v, c, s = np.r_[u, cells[0]], np.r_[v, cells[1]], whole.turn[:, :1], whole.turn[:, 1:]
+    U, V = c * u + s * v, c * v - s * u
     return Scene(
         U,
         V,
@@ -108,12 +109,6 @@ def lay_unobserved_cells(
     i, j = find_cells(u_lines, uvz[0]), find_cells(v_lines, uvz[1])
     cells = lay_cells(Cloud(uvz[0], uvz[1], uvz[2], i, j), u_lines, v_lines, density)
     return cells[:, whole.raster.measure(cells[0], cells[1]) > 0.0]
-
-
-def turn_to_directions(whole: Whole, u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return places (n,) of the plan's axes in each direction: U, V (directions, n)."""
-    c, s = whole.turn[:, :1], whole.turn[:, 1:]
-    return c * u + s * v, c * v - s * u
 
 
 def list_vertices(corners: np.ndarray) -> np.ndarray:

@@ -12,8 +12,7 @@ from .blocks import BLOCK_M2, HeightRaster, find_cheapest_cut
 from .grow import grow
 from .moves import refit_volumes
 from .objective import compute_objective, is_base_visible
-from .scene import end_at_border, open_window, turn_to_directions
-from .trim import trim
+from .scene import end_at_border, open_window
 from .volumes import U0, V1, make_base
 from .whole import Box, Whole, clip_to_box
 
@@ -84,9 +83,7 @@ def search_block(whole: Whole, box: Box, area_m2: float) -> list[np.ndarray]:
     if scene is None or full is None:
         return []
     volumes, _ = grow(scene)
-    volumes, value = refit_volumes(volumes, full, compute_objective(volumes, full))
-    nodes = turn_to_directions(whole, *whole.raster.cut(*box).list_nodes())
-    volumes, _ = trim(volumes, full, value, *nodes)
+    volumes, _ = refit_volumes(volumes, full, compute_objective(volumes, full))
     is_alone = box == whole.box
     if not is_base_visible(volumes, full, count_points=not is_alone):
         volumes = volumes[1:]
