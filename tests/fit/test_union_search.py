@@ -32,7 +32,7 @@ from hiproof.fit.union.moves import (
     count_seeds,
     find_best_plane,
     place_outside,
-    refit_volumes,
+    refit_volume,
 )
 from hiproof.fit.union.objective import (
     BASE_SHARE,
@@ -296,7 +296,9 @@ def test_moved_edges_leave_a_rectangle(seed):
 
 
 MOVES = {
-    "refit": refit_volumes,
+    "refit": lambda volumes, scene, value: refit_volume(
+        volumes, scene, value, 1, measure_context(volumes, scene.U, scene.V, 1)
+    ),
     "improve": lambda volumes, scene, value: improve(volumes, scene, value, SLOPES, 2),
 }
 

@@ -73,15 +73,6 @@ def remove_volume(volumes, k):
 
 
 @compiled
-def refit_volumes(volumes, scene, value):
-    """Refit every volume once, where that helps."""
-    for k in range(len(volumes)):
-        context = measure_context(volumes, scene.U, scene.V, k)
-        volumes, value = refit_volume(volumes, scene, value, k, context)
-    return volumes, value
-
-
-@compiled
 def refit_volume(volumes, scene, value, k, context):
     """Refit volume k, if that helps."""
     trial = volumes.copy()

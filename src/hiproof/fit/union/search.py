@@ -1,7 +1,7 @@
 """Search the volumes of a plan, block by block.
 
-Structure is searched with some of the points of a block, and fitted again to nearly all. The loop
-over moves makes one roof of what meets along the cuts.
+Structure is searched with some of the points of a block. The loop over moves fits it to all, and
+makes one roof of what meets along the cuts.
 """
 
 from __future__ import annotations
@@ -10,8 +10,7 @@ import numpy as np
 
 from .blocks import BLOCK_M2, HeightRaster, find_cheapest_cut
 from .grow import grow
-from .moves import refit_volumes
-from .objective import compute_objective, is_base_visible
+from .objective import is_base_visible
 from .scene import end_at_border, open_window
 from .volumes import U0, V1, make_base
 from .whole import Box, Whole, clip_to_box
@@ -19,8 +18,6 @@ from .whole import Box, Whole, clip_to_box
 # Points in which structure is searched, of a house and of a larger roof or block.
 HOUSE_POINTS, BLOCK_POINTS = 600, 1600
 LARGEST_HOUSE_M2 = 200.0  # Area (m2) of the largest house.
-# Points of a block to which its planes are fitted again: 5 per square metre of the largest block.
-FULL_POINTS = 3000
 LEAST_HALF_M2 = 1.0  # Least area (m2) of outline on either side of a cut.
 
 
@@ -76,16 +73,12 @@ def search_block(whole: Whole, box: Box, area_m2: float) -> list[np.ndarray]:
 
     It is searched by itself, its own base first. The list is empty for hardly a point.
     """
-    most = count_search_points(area_m2)
-    scene = full = open_window(whole, box, most)
-    if scene is not None and scene.n == most:
-        full = open_window(whole, box, FULL_POINTS)
-    if scene is None or full is None:
+    scene = open_window(whole, box, count_search_points(area_m2))
+    if scene is None:
         return []
     volumes, _ = grow(scene)
-    volumes, _ = refit_volumes(volumes, full, compute_objective(volumes, full))
     is_alone = box == whole.box
-    if not is_base_visible(volumes, full, count_points=not is_alone):
+    if not is_base_visible(volumes, scene, count_points=not is_alone):
         volumes = volumes[1:]
     elif not is_alone:
         volumes[0, U0 : V1 + 1] = box
