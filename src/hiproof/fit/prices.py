@@ -34,6 +34,7 @@ LEAN_UNITS = 1.0  # A line with a direction of its own.
 CORNER_UNITS = 0.3  # A corner of the drawn roof, at any level.
 LOW_STEP_UNITS = 0.23  # A metre of a step lower than half a metre.
 NARROW_M = 1.0  # Nobody draws what is narrower (m).
+SPAN_UNITS = 0.2  # A volume under all of the roof: what is hidden reaches no further than it must.
 LACK_UNITS = 4.0  # A m2 that a volume lacks to be as wide: what its points would explain.
 GIVEN_UNITS = 1.0  # The same between two lines of the outline.
 NARROW_UNITS = 0.6  # A metre of a step beside a narrower strip, unless it runs along a wall.

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...compiled import compiled
 from ..prices import NARROW_M
-from .draw import draw_in, is_near, widen_box
+from .draw import is_near, widen_box
 from .moves import (
     ALL_MOVES,
     MOVE_COLUMNS,
@@ -202,7 +202,6 @@ def improve(roof, trial, site, drawing, asked, rounds):
     for _ in range(rounds):
         fit_roof(roof, site, FIT_ROUNDS)
         known = know(roof, drawing, site)
-        draw_in(roof, drawing)
         price = price_known(known, site)
         if price > lowest - LEAST_UNITS * site.unit:
             return price

@@ -17,6 +17,7 @@ from ..prices import (
     LACK_UNITS,
     NARROW_M,
     SKEW_UNITS,
+    SPAN_UNITS,
     UNKNOWN_UNITS,
     VOLUME_UNITS,
 )
@@ -28,6 +29,7 @@ from .draw import (
     draw,
     is_near,
     list_corners,
+    measure_area,
     meets,
     widen_box,
 )
@@ -41,7 +43,7 @@ DAMPING = 0.05  # Points that hold an unknown at its value.
 Site = namedtuple(
     "Site",
     "x y z weight shade n low high dead width unit parts part_sizes part_boxes lines bays "
-    "bay_heights bounds narrow keeps_shapes",
+    "bay_heights bounds area narrow keeps_shapes",
 )
 """What the roof of a building has to explain.
 
@@ -52,7 +54,7 @@ Site = namedtuple(
 - parts (p, c, 2), part_sizes (p,), part_boxes (p, 4): convex parts of the outline.
 - lines (m, 6): lines of the outline, as `site.list_outline_lines` says.
 - bays (b, 4, 3), bay_heights (b,): sides and heights of places that a wall cuts off.
-- bounds (4,): least and greatest x and y of the outline.
+- bounds (4,): least and greatest x and y of the outline. area: its area (m2).
 - narrow: a volume is narrow below this width (m).
 - keeps_shapes: whether volumes keep their planes, because not all types may be built.
 """
@@ -215,14 +217,15 @@ def price_extents(roof, other, site):
 
 @compiled
 def price_extent(roof, k, site):
-    """Return the units of what volume k lacks in width inside the outline."""
-    plan, room = np.empty((RING_CORNERS, 2)), np.empty((RING_CORNERS, 2))
+    """Return the units of volume k's area inside the outline, and of what it lacks in width."""
+    plan, room, area = np.empty((RING_CORNERS, 2)), np.empty((RING_CORNERS, 2)), 0.0
     low, high = np.full(2, np.inf), np.full(2, -np.inf)
     for part in range(len(site.part_sizes)):
         box = site.part_boxes[part]
         if not meets(roof.boxes[k], box[0], box[1], box[2], box[3]):
             continue
         size = cut_part(roof, k, site, part, plan, room)
+        area += measure_area(plan, size) if size > 0 else 0.0
         for i in range(size):
             for axis in range(2):
                 half = roof.half_planes[k, 2 * axis]
@@ -230,12 +233,12 @@ def price_extent(roof, k, site):
                 low[axis], high[axis] = min(low[axis], across), max(high[axis], across)
     narrow = 0 if high[0] - low[0] < high[1] - low[1] else 1
     first, second = abs(roof.sides[k, 2 * narrow]) - 1, abs(roof.sides[k, 2 * narrow + 1]) - 1
-    lack = site.narrow - (high[narrow] - low[narrow])
+    lack, units = site.narrow - (high[narrow] - low[narrow]), SPAN_UNITS * area / site.area
     if not 0.0 < lack < site.narrow:
-        return 0.0
+        return units
     is_given = roof.lines[first, 3] + roof.lines[second, 3] == 0.0
     lack *= high[1 - narrow] - low[1 - narrow]
-    return (GIVEN_UNITS if is_given else LACK_UNITS) * lack
+    return units + (GIVEN_UNITS if is_given else LACK_UNITS) * lack
 
 
 @compiled

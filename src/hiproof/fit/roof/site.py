@@ -64,6 +64,7 @@ def make_site(whole: Whole, keeps_shapes: bool = False) -> Site:
         bays,
         heights,
         np.array([x0, x1, y0, y1]),
+        outline.area,
         min(NARROW_M, 2.0 * outline.area / outline.length),  # a slender outline is as wide
         keeps_shapes,
     )
