@@ -265,12 +265,8 @@ def arrange(
 
 def find_cells(problem: PlanProblem, reach: float, min_area: float, min_width: float) -> PlanCells:
     """Return the cells of one active plane, small ones merged; some may remain UNCOVERED."""
-    start = np.array([0, *itertools.accumulate(map(len, problem.soups))])
-    outlines = np.ascontiguousarray(np.concatenate(problem.soups), float)
-    ends = [f.reduceat(outlines.reshape(-1, 2), 2 * start[1:-1]) for f in (np.minimum, np.maximum)]
-    boxes = np.hstack(ends)
-    lines = meeting_lines(outlines, start, boxes, problem.planes, problem.plane_start)
-    soups = [outlines, *(patch for patch, _ in problem.patches), lines]
+    lines = meeting_lines(problem.soups[1:], problem.planes, problem.plane_start)
+    soups = [*problem.soups, *(patch for patch, _ in problem.patches), lines]
     xy, edges = node(np.concatenate(soups).astype(np.int64), reach)
     traced = trace_faces(xy, edges)
     label, patched = label_faces(traced.polygons, problem)
