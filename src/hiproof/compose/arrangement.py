@@ -12,6 +12,7 @@ twin of h is h ^ 1. Polygons are soups of edges (x0, y0, x1, y1) in any order; i
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -165,27 +166,33 @@ def look_up(keys: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     return order[np.searchsorted(keys, wanted, sorter=order)]
 
 
-def edge_lengths(xy: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    return np.hypot(*(xy[edges[:, 0]] - xy[edges[:, 1]]).T.astype(float))
+class PlanCells(NamedTuple):
+    """The plan as labelled edges.
+
+    `xy` (n, 2) are int64 grid units, `edges` (e, 2), and `side` (e, 2) the labels left and right. A
+    label is the index of the plane that roofs the cell, OUTSIDE (-1) beyond the outline.
+    """
+
+    xy: np.ndarray
+    edges: np.ndarray
+    side: np.ndarray
 
 
-def dissolve(
-    xy: np.ndarray, edges: np.ndarray, side: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Drop edges with one label (`side`: left, right), then straight vertices; compacted."""
-    is_border = side[:, 0] != side[:, 1]
-    edges = drop_straight_vertices(xy, edges[is_border])
-    return renumber_vertices(xy, edges, side[is_border])
+def dissolve(cells: PlanCells) -> PlanCells:
+    """Drop edges with one label on either side, then straight vertices; compacted."""
+    is_border = cells.side[:, 0] != cells.side[:, 1]
+    edges = drop_straight_vertices(cells.xy, cells.edges[is_border])
+    return renumber_vertices(PlanCells(cells.xy, edges, cells.side[is_border]))
 
 
-def renumber_vertices(
-    xy: np.ndarray, edges: np.ndarray, side: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def renumber_vertices(cells: PlanCells) -> PlanCells:
     """Renumber vertices in the order in which edges name them; edges below zero go."""
-    is_live = edges[:, 0] >= 0
-    used, first, number = np.unique(edges[is_live].ravel(), return_index=True, return_inverse=True)
+    is_live = cells.edges[:, 0] >= 0
+    ends = cells.edges[is_live].ravel()
+    used, first, number = np.unique(ends, return_index=True, return_inverse=True)
     order = np.argsort(first)
-    return xy[used[order]], np.argsort(order)[number].reshape(-1, 2), side[is_live]
+    edges = np.argsort(order)[number].reshape(-1, 2)
+    return PlanCells(cells.xy[used[order]], edges, cells.side[is_live])
 
 
 def drop_straight_vertices(xy: np.ndarray, edges: np.ndarray) -> np.ndarray:
@@ -249,14 +256,12 @@ def find_lowest(planes: np.ndarray, own: np.ndarray, lines: np.ndarray) -> np.nd
     return np.array([t_low, np.where((is_level & (base < -1e-3)).any(axis=1), t_low, t_high)])
 
 
-def meeting_lines(
-    soups: list[np.ndarray], planes: np.ndarray, plane_start: np.ndarray
-) -> np.ndarray:
+def meeting_lines(soups: Sequence[np.ndarray], groups: Sequence[np.ndarray]) -> np.ndarray:
     """Return the segments (m, 4) in plan along which the active plane of pieces changes.
 
-    `soups` (k,) are the edges of the pieces.
+    Pieces have edges, `soups`, and `groups` of planes.
     """
-    groups, result = np.split(planes, plane_start[1:-1]), [np.empty((0, 4))]
+    result = [np.empty((0, 4))]
     low, high = (np.array([f(soup[:, :2], axis=0) for soup in soups]) for f in (np.min, np.max))
     meets = ((low[:, None] <= high) & (low <= high[:, None])).all(axis=2)
     for p, q in np.argwhere(np.triu(meets)).tolist():

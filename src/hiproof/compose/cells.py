@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -22,8 +24,8 @@ from .arrangement import (
     OUTSIDE,
     UNCOVERED,
     HalfEdges,
+    PlanCells,
     dissolve,
-    edge_lengths,
     heights,
     meeting_lines,
     node,
@@ -55,7 +57,7 @@ def merge_slivers(
     between it and the region it belongs to may become that region's. One that would carry its plane
     on to where no roof is around keeps out, unless nobody could see the region.
     """
-    sides, length = traced.face.reshape(-1, 2), edge_lengths(xy, edges)
+    sides, length = traced.face.reshape(-1, 2), np.hypot(*np.diff(xy[edges], axis=1)[:, 0].T)
     area = shapely.area(traced.polygons)
     keeps_out = np.zeros(len(label), bool)
     curves = np.where(np.isin(problem.part, problem.curved), problem.part, NO_CURVE)
@@ -144,36 +146,46 @@ SHORT_UNITS = 30.0
 MAX_EXTENT_M = 50_000.0
 
 
+class PlanPiece(NamedTuple):
+    """A piece of a roof: its edges (m, 4), `planes` (k, 3) of heights in grid units, its part."""
+
+    soup: np.ndarray
+    planes: np.ndarray
+    part: int
+
+
 @dataclass(frozen=True)
 class PlanProblem:
     """A roof in grid units.
 
-    Polygons are soups of edges: polygon 0 is the outline, polygon k + 1 that of piece k. `planes`
-    (p, 3) give heights in grid units; `group` (p,) the first plane equal to each within its roof
-    part, `part` (p,) the roof part it belongs to. `curved` are the curved roof parts. `patches` are
-    (soup, label) pairs that overrule the height function.
+    Polygons are soups of edges. `curved` are the curved roof parts. `patches` are (soup, label)
+    pairs that overrule the height function.
     """
 
-    soups: list[np.ndarray]
-    planes: np.ndarray
-    plane_start: np.ndarray
-    group: np.ndarray
-    part: np.ndarray
+    outline: np.ndarray
+    pieces: tuple[PlanPiece, ...]
     curved: tuple[int, ...]
-    patches: list[tuple[np.ndarray, int]] = field(default_factory=list)
+    patches: tuple[tuple[np.ndarray, int], ...] = ()
 
+    @cached_property
+    def planes(self) -> np.ndarray:
+        """The planes (p, 3) of all pieces."""
+        return np.concatenate([piece.planes for piece in self.pieces])
 
-@dataclass(frozen=True)
-class PlanCells:
-    """The plan as labelled edges.
+    @cached_property
+    def piece(self) -> np.ndarray:
+        """The number (p,) of each plane's piece."""
+        return np.repeat(range(len(self.pieces)), [len(piece.planes) for piece in self.pieces])
 
-    `xy` (n, 2) are int64 grid units, `edges` (e, 2), and `side` (e, 2) the labels left and right. A
-    label is the index of the plane that roofs the cell, OUTSIDE (-1) beyond the outline.
-    """
+    @cached_property
+    def part(self) -> np.ndarray:
+        """The roof part (p,) that each plane belongs to."""
+        return np.array([piece.part for piece in self.pieces])[self.piece]
 
-    xy: np.ndarray
-    edges: np.ndarray
-    side: np.ndarray
+    @cached_property
+    def group(self) -> np.ndarray:
+        """The first plane (p,) equal to each."""
+        return equal_planes(self.planes * [1, 1, GRID_M])
 
 
 def polygon_soups(polygons: list[shapely.Polygon]) -> list[np.ndarray]:
@@ -196,35 +208,26 @@ def polygon_soups(polygons: list[shapely.Polygon]) -> list[np.ndarray]:
 
 def plan_problem(roof: Roof) -> PlanProblem:
     """Return the roof on the grid; raises CompositionError without outline, pieces or planes."""
-    outline, *borders = polygon_soups([roof.outline, *(piece.outline for piece in roof.pieces)])
-    part_of_piece = [index for index, part in enumerate(roof.parts) for _ in part.pieces]
-    pieces = [
-        (border, np.asarray(piece.planes, float).reshape(-1, 3), index)
-        for border, piece, index in zip(borders, roof.pieces, part_of_piece, strict=True)
-        if len(border) and len(piece.planes)
-    ]
+    outline, *soups = polygon_soups([roof.outline, *(piece.outline for piece in roof.pieces)])
+    parts = [index for index, part in enumerate(roof.parts) for _ in part.pieces]
+    planes = [np.reshape(piece.planes, (-1, 3)) / [1, 1, GRID_M] for piece in roof.pieces]
+    pieces = tuple(
+        piece
+        for piece in map(PlanPiece, soups, planes, parts)
+        if len(piece.soup) and len(piece.planes)
+    )
     if len(outline) == 0 or not pieces:
         raise CompositionError(
             "expected a roof with an outline and at least one piece with planes, got none; fall "
             "back to a flat block"
         )
-    borders, planes, part = zip(*pieces, strict=True)
-    counts = [len(plane) for plane in planes]
-    stacked = np.concatenate(planes)
-    if not np.isfinite(stacked).all():
+    curved = tuple(k for k, part in enumerate(roof.parts) if part.type in SMOOTH)
+    problem = PlanProblem(outline, pieces, curved)
+    if not np.isfinite(problem.planes).all():
         raise CompositionError(
             "expected finite roof planes, got NaN or infinity; fall back to a flat block"
         )
-    plane_start = np.array([0, *itertools.accumulate(counts)])
-    in_grid_units = stacked / [1, 1, GRID_M]
-    return PlanProblem(
-        [outline, *borders],
-        in_grid_units,
-        plane_start,
-        equal_planes(stacked),
-        np.repeat(part, counts),
-        tuple(k for k, one in enumerate(roof.parts) if one.type in SMOOTH),
-    )
+    return problem
 
 
 SAME_PLANES = 1e-6  # m, and of slope; planes that differ by less are one
@@ -265,14 +268,15 @@ def arrange(
 
 def find_cells(problem: PlanProblem, reach: float, min_area: float, min_width: float) -> PlanCells:
     """Return the cells of one active plane, small ones merged; some may remain UNCOVERED."""
-    lines = meeting_lines(problem.soups[1:], problem.planes, problem.plane_start)
-    soups = [*problem.soups, *(patch for patch, _ in problem.patches), lines]
+    borders, planes, _ = zip(*problem.pieces, strict=True)
+    patches = [patch for patch, _ in problem.patches]
+    soups = [problem.outline, *borders, *patches, meeting_lines(borders, planes)]
     xy, edges = node(np.concatenate(soups).astype(np.int64), reach)
     traced = trace_faces(xy, edges)
     label, patched = label_faces(traced.polygons, problem)
     merge_slivers(xy, edges, traced, label, patched, problem, min_area, min_width)
     keep_largest_component(traced, label)
-    return PlanCells(*dissolve(xy, edges, label[traced.face].reshape(-1, 2)))
+    return dissolve(PlanCells(xy, edges, label[traced.face].reshape(-1, 2)))
 
 
 def label_faces(faces: np.ndarray, problem: PlanProblem) -> tuple[np.ndarray, np.ndarray]:
@@ -283,15 +287,16 @@ def label_faces(faces: np.ndarray, problem: PlanProblem) -> tuple[np.ndarray, np
     """
     x, y = shapely.get_coordinates(shapely.point_on_surface(faces)).T
     label, best = np.full(len(x), UNCOVERED), np.full(len(x), -np.inf)
-    for k, (lower, upper) in enumerate(itertools.pairwise(problem.plane_start), 1):
-        here = np.flatnonzero(is_inside(problem.soups[k], x, y))
-        z = heights(problem.planes[lower:upper, None], x[here], y[here])
+    for k, piece in enumerate(problem.pieces):
+        here = np.flatnonzero(is_inside(piece.soup, x, y))
+        z = heights(piece.planes[:, None], x[here], y[here])
         lowest = (z <= z.min(axis=0) + SAME_UNITS).argmax(axis=0)
         z = z[lowest, np.arange(len(here))]
         is_higher = z > best[here] + SAME_UNITS
         here = here[is_higher]
-        label[here], best[here] = problem.group[lower + lowest[is_higher]], z[is_higher]
-    label[~is_inside(problem.soups[0], x, y)] = OUTSIDE
+        group = problem.group[problem.piece == k]
+        label[here], best[here] = group[lowest[is_higher]], z[is_higher]
+    label[~is_inside(problem.outline, x, y)] = OUTSIDE
     patched = np.zeros(len(x), bool)
     for soup, own in problem.patches:
         over = is_inside(soup, x, y)
@@ -333,9 +338,7 @@ def drop_short_edges(cells: PlanCells, planes: np.ndarray, reach: float) -> Plan
                 ends[meeting[0]] = [stays if w == missing else w for w in ends[meeting[0]]]
                 ends[e] = [-1, -1]
                 break
-    return PlanCells(
-        *renumber_vertices(cells.xy, np.array(ends, np.int64).reshape(-1, 2), cells.side)
-    )
+    return renumber_vertices(cells._replace(edges=np.array(ends, np.int64).reshape(-1, 2)))
 
 
 def is_clear(xy: np.ndarray, ends: list[list[int]], corners: list[int], reach: float) -> bool:
@@ -358,28 +361,15 @@ def extend_over_gaps(problem: PlanProblem, cells: PlanCells) -> PlanProblem:
 def cover_gap(problem: PlanProblem, gap: np.ndarray, neighbour: np.ndarray) -> PlanProblem:
     """Add a piece over the polygon `gap` (m, 4), whose edges border cells `neighbour` (m,)."""
     length = np.hypot(gap[:, 2] - gap[:, 0], gap[:, 3] - gap[:, 1])
-    piece_of_plane = (
-        np.searchsorted(problem.plane_start, np.arange(len(problem.planes)), side="right") - 1
-    )
     roofed = neighbour >= 0
-    shared = np.bincount(
-        piece_of_plane[neighbour[roofed]], length[roofed], minlength=len(problem.plane_start) - 1
-    )
-    piece = int(shared.argmax()) if shared.any() else nearest_piece(problem, gap)
-    lower, upper = problem.plane_start[piece], problem.plane_start[piece + 1]
-    return PlanProblem(
-        [*problem.soups, gap],
-        np.concatenate((problem.planes, problem.planes[lower:upper])),
-        np.append(problem.plane_start, problem.plane_start[-1] + upper - lower),
-        np.concatenate((problem.group, problem.group[lower:upper])),
-        np.concatenate((problem.part, problem.part[lower:upper])),
-        problem.curved,
-        problem.patches,
-    )
+    shared = np.bincount(problem.piece[neighbour[roofed]], length[roofed])
+    if shared.any():
+        piece = problem.pieces[shared.argmax()]
+    else:  # that whose border comes nearest to the first corner
+        corner = shapely.Point(gap[0, :2])
+        piece = min(problem.pieces, key=lambda piece: corner.distance(draw_edges(piece.soup)))
+    return replace(problem, pieces=(*problem.pieces, piece._replace(soup=gap)))
 
 
-def nearest_piece(problem: PlanProblem, gap: np.ndarray) -> int:
-    """Return the piece whose border comes nearest to the first corner of a `gap` (m, 4)."""
-    corner = shapely.Point(gap[0, :2])
-    borders = [shapely.multilinestrings(list(soup.reshape(-1, 2, 2))) for soup in problem.soups[1:]]
-    return int(np.argmin([corner.distance(border) for border in borders]))
+def draw_edges(soup: np.ndarray) -> shapely.Geometry:
+    return shapely.multilinestrings(list(soup.reshape(-1, 2, 2)))

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from .arrangement import OUTSIDE, find_previous, heights, trace_faces
+from .arrangement import OUTSIDE, PlanCells, find_previous, heights, trace_faces
 
 # units of the grid, 1.1 mm; levels closer than this become one: points within 1 mm are one by
 # ISO 19107 as checked
@@ -19,13 +19,14 @@ ASIDE_UNITS = (6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0)
 
 
 def split_at_crossings(
-    xy: np.ndarray, edges: np.ndarray, side: np.ndarray, planes: np.ndarray, reach: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[tuple[int, float, float]]]:
+    cells: PlanCells, planes: np.ndarray, reach: float
+) -> tuple[PlanCells, list[tuple[int, float, float]]]:
     """Split every edge over which the two cells' heights swap order.
 
-    Returns (xy, edges, side, ties). A tie (vertex, z low, z high) replaces a split that would fall
+    Returns the cells and ties. A tie (vertex, z low, z high) replaces a split that would fall
     within reach of a vertex: there the levels become one.
     """
+    xy, edges, side = cells
     x, y = np.moveaxis(xy[edges], -1, 0)
     left, right = (heights(planes[side[:, k], None], x, y) for k in (0, 1))
     gap = left - right
@@ -41,26 +42,17 @@ def split_at_crossings(
             continue
         place = (a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]))
         if min(t, 1 - t) * length < NEAR_UNITS:
-            place = move_crossing(xy, edges, planes[side[e]], e, place, reach)
+            place = move_crossing(cells, planes[side[e]], e, place, reach)
         split[e, 1] = len(xy) + len(places) - 1
         places.append(np.rint([place]).astype(np.int64))
     is_split = split[:, 1] >= len(xy)
     rest = np.column_stack([split[is_split, 1], edges[is_split, 1]])
-    return (
-        np.concatenate(places),
-        np.concatenate([split, rest]),
-        np.concatenate([side, side[is_split]]),
-        ties,
-    )
+    parts = places, [split, rest], [side, side[is_split]]
+    return PlanCells(*map(np.concatenate, parts)), ties
 
 
 def move_crossing(
-    xy: np.ndarray,
-    edges: np.ndarray,
-    planes: np.ndarray,
-    e: int,
-    place: tuple[float, float],
-    reach: float,
+    cells: PlanCells, planes: np.ndarray, e: int, place: tuple[float, float], reach: float
 ) -> tuple[float, float]:
     """Return the grid point for a crossing of the two `planes` (2, 3) beside edge e.
 
@@ -70,7 +62,7 @@ def move_crossing(
     both are nearest the grid.
     """
     gx, gy, _ = planes[0] - planes[1]
-    along = xy[edges[e, 1]] - xy[edges[e, 0]]
+    along = np.diff(cells.xy[cells.edges[e]], axis=0)[0]
     size = math.hypot(gx, gy)
     # sine of the angle between that line and e
     across = abs((gx * along[0] + gy * along[1]) / (size * math.hypot(*along)))
@@ -81,9 +73,10 @@ def move_crossing(
     x, y = np.rint(place[0] - steps * gy), np.rint(place[1] + steps * gx)
     z = heights(planes[:, None], x, y)
     off = np.abs(z - np.rint(0.5 * (z[0] + z[1]))).max(axis=0) / aside
-    others = shapely.multilinestrings(shapely.linestrings(xy[np.delete(edges, e, axis=0)]))
+    others = cells.xy[np.delete(cells.edges, e, axis=0)]
+    lines = shapely.multilinestrings(shapely.linestrings(others))
     for k in np.argsort(off, kind="stable"):
-        if shapely.distance(others, shapely.Point(x[k], y[k])) >= reach:
+        if shapely.distance(lines, shapely.Point(x[k], y[k])) >= reach:
             return x[k], y[k]
     return place
 
@@ -104,16 +97,10 @@ class Levels(NamedTuple):
 
 
 def stack_levels(
-    xy: np.ndarray,
-    edges: np.ndarray,
-    side: np.ndarray,
-    planes: np.ndarray,
-    z_ground: float,
-    ties: list[tuple[int, float, float]],
+    cells: PlanCells, planes: np.ndarray, z_ground: float, ties: list[tuple[int, float, float]]
 ) -> Levels:
     """Stack levels over every plan vertex, in grid units."""
-    order, face, polygons = trace_faces(xy, edges)
-    label, origin = side.ravel(), edges.ravel()
+    xy, origin, label = cells.xy, cells.edges.ravel(), cells.side.ravel()
     z = np.where(label == OUTSIDE, z_ground, heights(planes[label], *xy[origin].T))
     ranking = np.lexsort((z, origin))
     z, at = z[ranking], origin[ranking]
@@ -124,15 +111,16 @@ def stack_levels(
     level[ranking] = np.append(0, np.cumsum(is_top))
     first, last = np.flatnonzero(np.append(True, is_top)), np.flatnonzero(np.append(is_top, True))
     middle = np.rint(0.5 * (z[first] + z[last]))
-    return Levels(order, face, polygons, level, np.column_stack([xy[at[first]], middle]))
+    traced = trace_faces(xy, cells.edges)
+    return Levels(*traced, level, np.column_stack([xy[at[first]], middle]))
 
 
-def find_saddles(edges: np.ndarray, levels: Levels, label: np.ndarray) -> np.ndarray:
+def find_saddles(cells: PlanCells, levels: Levels) -> np.ndarray:
     """Return plan vertices where levels rise and fall twice, or a cell has two sectors."""
-    origin, order, level = edges.ravel(), levels.order, levels.level
+    origin, order, level = cells.edges.ravel(), levels.order, levels.level
     rise = level[order] - level[order[find_previous(origin[order])]]
     climbing, at = rise[rise != 0] > 0, origin[order][rise != 0]
     turns = np.bincount(at, climbing != climbing[find_previous(at)])
-    sectors = np.column_stack([origin, levels.face])[label != OUTSIDE]
+    sectors = np.column_stack([origin, levels.face])[cells.side.ravel() != OUTSIDE]
     sectors, counts = np.unique(sectors, axis=0, return_counts=True)
     return np.union1d(np.flatnonzero(turns > 2), sectors[counts > 1, 0])

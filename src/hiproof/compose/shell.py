@@ -9,8 +9,8 @@ import numpy as np
 
 from ..errors import CompositionError
 from ..model import ROOF, Solid
-from .arrangement import GRID_M, OUTSIDE, heights
-from .cells import PlanCells, PlanProblem
+from .arrangement import GRID_M, OUTSIDE, PlanCells, heights
+from .cells import PlanProblem
 from .levels import Levels, find_saddles, split_at_crossings, stack_levels
 from .lids import Lid, close_lids, draw_base, join_straight_edges, list_rings
 
@@ -46,29 +46,24 @@ def raise_shell(
     keep the `reach` (grid units). Patches are wider by the factor `widening`.
     """
     planes = problem.planes
-    xy, edges, side, ties = split_at_crossings(cells.xy, cells.edges, cells.side, planes, reach)
-    if len(edges) == 0:
+    cells, ties = split_at_crossings(cells, planes, reach)
+    if len(cells.edges) == 0:
         raise CompositionError(
             "expected an outline with an area, got one thinner than a millimetre; repair or remove "
             "the footprint"
         )
-    z_low = lowest_roof(xy, edges, side, planes) - clearance_m / GRID_M
+    label = cells.side.ravel()
+    x, y = np.moveaxis(cells.xy[np.repeat(cells.edges, 2, axis=0)], -1, 0)
+    z_low = heights(planes[label, None], x, y)[label != OUTSIDE].min() - clearance_m / GRID_M
     z_base = np.floor(min(z_ground / GRID_M, z_low))
-    levels = stack_levels(xy, edges, side, planes, z_base, ties)
-    saddles = find_saddles(edges, levels, side.ravel())
+    levels = stack_levels(cells, planes, z_base, ties)
+    saddles = find_saddles(cells, levels)
     if len(saddles):
         radius = max(SETBACK_M / GRID_M, 4 * reach) * widening
-        raise Saddles([cure(sectors_at(v, xy, edges, side, levels), radius) for v in saddles])
-    roofs = draw_roofs(side.ravel(), levels, problem.part)
+        raise Saddles([cure(sectors_at(v, cells, levels), radius) for v in saddles])
+    roofs = draw_roofs(label, levels, problem.part)
     ground = draw_base(roofs, int(z_base))
     return close_lids([*roofs, join_straight_edges(ground) if merges_walls else ground])
-
-
-def lowest_roof(xy: np.ndarray, edges: np.ndarray, side: np.ndarray, planes: np.ndarray) -> float:
-    """Return the lowest roof height at any vertex of any cell, in grid units."""
-    label = side.ravel()
-    x, y = np.moveaxis(xy[np.repeat(edges, 2, axis=0)], -1, 0)
-    return float(heights(planes[label, None], x, y)[label != OUTSIDE].min())
 
 
 def draw_roofs(label: np.ndarray, levels: Levels, part: np.ndarray) -> list[Lid]:
@@ -121,23 +116,16 @@ class Sectors:
         return np.hstack((polygon, np.roll(polygon, -1, axis=0)))
 
 
-def sectors_at(
-    v: int, xy: np.ndarray, edges: np.ndarray, side: np.ndarray, levels: Levels
-) -> Sectors:
+def sectors_at(v: int, cells: PlanCells, levels: Levels) -> Sectors:
     """Return the sectors around plan vertex v."""
-    surroundings = levels.order[edges.ravel()[levels.order] == v]
-    arms = (xy[edges[surroundings >> 1, 1 - (surroundings & 1)]] - xy[v]).astype(float)
+    surroundings = levels.order[cells.edges.ravel()[levels.order] == v]
+    ends = cells.edges[surroundings >> 1, 1 - (surroundings & 1)]
+    arms = (cells.xy[ends] - cells.xy[v]).astype(float)
     angle = np.arctan2(arms[:, 1], arms[:, 0])
     opening = np.mod(np.roll(angle, -1) - angle, 2 * np.pi)
-    label = side.ravel()[surroundings]
-    return Sectors(
-        xy[v].astype(float),
-        angle.tolist(),
-        opening.tolist(),
-        levels.level[surroundings].tolist(),
-        levels.face[surroundings].tolist(),
-        label.tolist(),
-    )
+    own = (levels.level, levels.face, cells.side.ravel())
+    values = angle, opening, *(values[surroundings] for values in own)
+    return Sectors(cells.xy[v].astype(float), *(array.tolist() for array in values))
 
 
 def cure(sectors: Sectors, radius: float) -> tuple[np.ndarray, int]:

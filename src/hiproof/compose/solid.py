@@ -104,7 +104,7 @@ def compose_at(
         try:
             return raise_shell(cells, problem, z_ground, clearance_m, merges_walls, reach, widening)
         except Saddles as saddles:
-            problem = replace(problem, patches=[*problem.patches, *saddles.patches])
+            problem = replace(problem, patches=(*problem.patches, *saddles.patches))
     raise CompositionError(
         "expected corners where roof levels meet crosswise to be mended in ten rounds, "
         "got some after them"
