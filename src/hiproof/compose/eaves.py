@@ -21,7 +21,7 @@ from .check import Finding, check_solid
 from .overhang import hang_over, to_grid
 from .settle import PLAN_DIGITS
 from .solid import compose
-from .underside import cap_by_place, cap_everywhere
+from .underside import list_caps
 
 CORNER_GAP_M = 0.002  # between corners of walls; rounding may part one corner by less
 
@@ -155,9 +155,7 @@ def close_solid(
     along a line.
     """
     options = model.compose or ComposeSettings()
-    caps = [cap_by_place(level, options.ground_clearance_m)]
-    if model.underside.terrain:
-        caps.append(cap_everywhere(level, options.ground_clearance_m))
+    caps = list_caps(level, model.underside, options.ground_clearance_m)
     for cap, share in itertools.product(caps, THICKNESS_SHARES):
         thickness = round(share * thickness_m / GRID_M)
         solid = hang_over(level, model.underside, cap, to_grid(walls), thickness)

@@ -64,11 +64,7 @@ def make_underside(solid: Solid, underside: Underside, options: ComposeSettings)
     """
     findings: tuple = ()
     roofs = list_lids(solid, ROOF)
-    clearance = options.ground_clearance_m
-    caps = [cap_by_place(solid, clearance)]
-    if underside.terrain:
-        caps.append(cap_everywhere(solid, clearance))
-    for cap in caps:
+    for cap in list_caps(solid, underside, options.ground_clearance_m):
         lids = list_undersides(solid, underside, cap, draw_ground(solid), list_places(roofs))
         for reach in REACHES:
             result = close_lids([*roofs, *lids], reach)
@@ -90,30 +86,23 @@ def make_underside(solid: Solid, underside: Underside, options: ComposeSettings)
 Cap = Callable[[np.ndarray], np.ndarray]
 
 
-def cap_by_place(solid: Solid, clearance_m: float) -> Cap:
-    """Return a height below the lowest roof face over each place."""
+def list_caps(solid: Solid, underside: Underside, clearance_m: float) -> list[Cap]:
+    """Return a height below the lowest roof face over each place, then one below them all."""
     roofs = solid.select_faces(ROOF)
     polygons = np.array(
         [shapely.transform(solid.project_face(face), lambda xy: xy / GRID_M) for face in roofs]
     )
     planes = np.array([fit_plane(solid, face) for face in roofs])
 
-    def cap(xy: np.ndarray) -> np.ndarray:
+    def cap_by_place(xy: np.ndarray) -> np.ndarray:
         over = shapely.distance(shapely.points(xy)[:, None], polygons[None]) <= ON_ROOF_UNITS
         z = xy @ planes[:, :2].T + (planes[:, 2] - clearance_m) / GRID_M
         return np.where(over, z, np.inf).min(axis=1)
 
-    return cap
-
-
-def cap_everywhere(solid: Solid, clearance_m: float) -> Cap:
-    """Return a height below the lowest roof for every place."""
-    lowest = min(
-        solid.vertices[list(ring), 2].min()
-        for face in solid.select_faces(ROOF)
-        for ring in face.rings
-    )
-    return lambda xy: np.full(len(xy), (lowest - clearance_m) / GRID_M)
+    lowest = min(solid.vertices[list(ring), 2].min() for face in roofs for ring in face.rings)
+    everywhere = (lowest - clearance_m) / GRID_M
+    caps: list[Cap] = [cap_by_place, lambda xy: np.full(len(xy), everywhere)]
+    return caps if underside.terrain else caps[:1]
 
 
 def fit_plane(solid: Solid, face: Face) -> np.ndarray:

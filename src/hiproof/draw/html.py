@@ -8,7 +8,7 @@ from html import escape
 
 import numpy as np
 
-from ..data_files import read_asset
+from ..data_files import draw_rings, read_asset
 from ..errors import escape_unseen
 from ..model import Building, Part
 from ..write.attribute_list import ANGLES
@@ -74,9 +74,7 @@ def render_view(building: Building) -> str:
 
 def render_path(rings: tuple[np.ndarray, ...], colour: str, scale: float) -> str:
     """Return a face as an SVG path."""
-    d = "".join(
-        "M" + "L".join(f"{x * scale:.1f} {y * scale:.1f}" for x, y in ring) + "Z" for ring in rings
-    )
+    d = draw_rings(ring * scale for ring in rings)
     return f'<path d="{d}" fill="{colour}" fill-rule="evenodd" stroke="#333" stroke-width="0.7"/>'
 
 

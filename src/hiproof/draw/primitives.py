@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..data_files import draw_rings
 from ..model import Building
 from ..parametric.building import build
 from ..primitives.catalogue import CATALOGUE
@@ -154,10 +155,7 @@ def primitive_svg(kind: str) -> str:
 
 
 def face_path(face: SeenFace) -> str:
-    d = "".join(
-        "M" + "L".join(f"{FIGURE_SCALE * x:.1f} {FIGURE_SCALE * y:.1f}" for x, y in ring) + "Z"
-        for ring in face.rings
-    )
+    d = draw_rings(FIGURE_SCALE * ring for ring in face.rings)
     return (
         f'<path d="{d}" fill="{shade_colour(face.colour, face.light)}" stroke="#333" '
         'stroke-width="1" '

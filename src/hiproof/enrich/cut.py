@@ -49,17 +49,12 @@ def cut_walls(
             if face not in cuts
         }
         result, party = rebuild(solid, by_face, cuts | more)
-        if is_sound(result):
+        if not check_solid(result):
             return result, party
         for face, pieces in more.items():
-            if is_sound(rebuild(solid, by_face, cuts | {face: pieces})[0]):
+            if not check_solid(rebuild(solid, by_face, cuts | {face: pieces})[0]):
                 cuts[face] = pieces
     return rebuild(solid, by_face, cuts)
-
-
-def is_sound(solid: Solid) -> bool:
-    """Return whether a solid is valid."""
-    return not check_solid(solid)
 
 
 def cut_polygon(

@@ -15,7 +15,6 @@ import numpy as np
 import shapely
 
 from ..geometry.rings import with_area
-from ..model import Building
 from ..settings import EnrichSettings
 from .records import MOST_KEPT, Records
 from .walls import Wall, find_walls
@@ -128,11 +127,9 @@ class Town:
 
     def __init__(self, records: Records, touch_m: float = PARTY_GAP_M) -> None:
         self.records, self.touch_m = records, touch_m
+        self.read = records.read
         self.list_walls = functools.lru_cache(MOST_KEPT)(self.find_walls)
         self.list_pair = functools.lru_cache(8 * MOST_KEPT)(self.find_pair)
-
-    def read(self, number: int) -> Building:
-        return self.records.read(number)
 
     def find_walls(self, number: int) -> tuple[Wall, ...]:
         building = self.read(number)

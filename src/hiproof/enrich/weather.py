@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from pyproj import Geod
 
 from ..errors import InputError, explain_fault, warn
 from ..extras import import_extra
@@ -104,7 +105,9 @@ def read_weather(path: str, place: Any) -> tuple[Any, Any]:
     and for a station too far away.
     """
     weather = read_year(path)
-    distance = measure_distance(weather.where, (place.latitude, place.longitude))
+    where = weather.where[::-1], (place.longitude, place.latitude)
+    radius_m = 1000.0 * EARTH_RADIUS_KM
+    distance = Geod(a=radius_m, b=radius_m).inv(*where[0], *where[1])[2] / 1000.0
     if not distance <= FARTHEST_STATION_KM:
         raise InputError(
             f"expected a weather station within {FARTHEST_STATION_KM:g} km of the buildings, got "
@@ -149,26 +152,16 @@ def parse_weather(path: Path) -> Weather:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
         text = data.decode("latin-1")
-    ending = path.suffix.lower()
+    ending, tools = path.suffix.lower(), import_pvlib().iotools
     if ending == ".json":
         return parse_pvgis(io.StringIO(text), "json")
-    if ending != ".csv":
-        return parse_epw(text)
-    if text.startswith(PVGIS_CSV):
+    if text.startswith(PVGIS_CSV) and ending == ".csv":
         return parse_pvgis(io.BytesIO(text.encode()), "csv")
-    return parse_tmy3(text)
-
-
-def parse_epw(text: str) -> Weather:
-    """Read EPW, without a leap day. Its hours end at their stamps, where pvlib's begin."""
-    text = LEAP_DAY.sub("", text)
-    values, station = import_pvlib().iotools.read_epw(io.StringIO(text), coerce_year=int(YEAR))
-    return Weather(shift_hours(values.index, 0.5), values, locate_station(station))
-
-
-def parse_tmy3(text: str) -> Weather:
-    values, station = import_pvlib().iotools.read_tmy3(io.StringIO(text), coerce_year=int(YEAR))
-    return Weather(shift_hours(values.index, -0.5), values, locate_station(station))
+    # hours end at their stamps, but those of EPW begin there in pvlib
+    read, delay = (tools.read_tmy3, -0.5) if ending == ".csv" else (tools.read_epw, 0.5)
+    text = text if ending == ".csv" else LEAP_DAY.sub("", text)
+    values, station = read(io.StringIO(text), coerce_year=int(YEAR))
+    return Weather(shift_hours(values.index, delay), values, locate_station(station))
 
 
 def parse_pvgis(file: io.StringIO | io.BytesIO, form: str) -> Weather:
@@ -370,14 +363,3 @@ def locate_station(station: dict[str, Any]) -> tuple[float, float]:
     if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0):
         raise ValueError(f"a station at latitude {latitude:g} and longitude {longitude:g}")
     return latitude, longitude
-
-
-def measure_distance(one: tuple[float, float], other: tuple[float, float]) -> float:
-    """Return the distance (km) of two places in latitude and longitude (degrees).
-
-    >>> round(measure_distance((52.0, 4.4), (48.1, 11.6)))
-    672
-    """
-    (a, b), (c, d) = np.radians(one), np.radians(other)
-    half = np.sin((c - a) / 2) ** 2 + np.cos(a) * np.cos(c) * np.sin((d - b) / 2) ** 2
-    return float(2 * EARTH_RADIUS_KM * np.arcsin(np.sqrt(half)))

@@ -48,12 +48,15 @@ def well_inside(points: np.ndarray, outline: shapely.Geometry) -> Inner:
 def roof_polygons(model: Solid | Fit | Polygons) -> list[list[np.ndarray]]:
     """Return roof surfaces as lists of rings (m, 3), the outer first, in the model's frame."""
     if isinstance(model, Solid):
-        return [
-            [model.vertices[list(ring)] for ring in face.rings] for face in model.select_faces(ROOF)
-        ]
+        return list_rings(model, ROOF)
     if isinstance(model, Fit):
         return [[model.vertices[list(face)]] for face in model.faces]
     return [[polygon] if isinstance(polygon, np.ndarray) else list(polygon) for polygon in model]
+
+
+def list_rings(solid: Solid, kind: str) -> list[list[np.ndarray]]:
+    """Return the faces of a kind as lists of rings (m, 3), the outer first."""
+    return [[solid.vertices[list(ring)] for ring in f.rings] for f in solid.select_faces(kind)]
 
 
 def plan_outline(model: Solid | Fit | Polygons) -> shapely.Geometry:

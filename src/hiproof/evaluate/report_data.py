@@ -116,35 +116,30 @@ def mesh_data(run: EvaluatedRun, types: list[str], origin: np.ndarray) -> dict[s
     They are corners (t, 3, 3), building (t,), `roof_places` (t,), the sun (t,), and edges
     (e, 2, 3).
     """
-    solids = [
-        (index, model.solid) for index, model in enumerate(run.models) if model.solid is not None
+    meshes = [
+        (k, model, solid_mesh(model.solid.move(-origin)))
+        for k, model in enumerate(run.models)
+        if model.solid is not None
     ]
-    meshes = [solid_mesh(solid.move(-origin)) for _, solid in solids]
-    owners = [
-        np.full(len(mesh.part), index) for (index, _), mesh in zip(solids, meshes, strict=True)
-    ]
+    # -1 where unknown; nothing in a run without the sun
     suns = [
-        np.array(run.models[index].suns or [np.nan] * len(solid.faces))[mesh.face]
-        for (index, solid), mesh in zip(solids, meshes, strict=True)
-    ]
-    roofs = [
-        roof_places(run.models[index], mesh.part, types)
-        for (index, _), mesh in zip(solids, meshes, strict=True)
+        np.nan_to_num(np.array(model.suns)[mesh.face], nan=-1.0)
+        if model.suns
+        else np.full(len(mesh.face), -1.0)
+        for _, model, mesh in meshes
     ]
     return {
-        "corners": pack_values(
-            np.concatenate([np.empty((0, 3, 3)), *(mesh.corners for mesh in meshes)]), "<f4"
-        ),
-        "owner": pack_values(np.concatenate([np.empty(0), *owners]), "<u4"),
-        "roof": pack_values(np.concatenate([np.empty(0), *roofs]), "u1"),
-        # -1 where unknown; nothing in a run without the sun
-        "sun": pack_values(np.nan_to_num(np.concatenate([np.empty(0), *suns]), nan=-1.0), "<f4")
-        if any(model.suns for model in run.models)
-        else "",
-        "edges": pack_values(
-            np.concatenate([np.empty((0, 2, 3)), *(mesh.edges for mesh in meshes)]), "<f4"
-        ),
+        "corners": pack_all([mesh.corners for *_, mesh in meshes], "<f4"),
+        "owner": pack_all([np.full(len(mesh.part), k) for k, _, mesh in meshes], "<u4"),
+        "roof": pack_all([roof_places(model, m.part, types) for _, model, m in meshes], "u1"),
+        "sun": pack_all(suns, "<f4") if any(model.suns for model in run.models) else "",
+        "edges": pack_all([mesh.edges for *_, mesh in meshes], "<f4"),
     }
+
+
+def pack_all(arrays: Sequence[Any], kind: str) -> str:
+    """Pack arrays one after the other, nothing where there are none."""
+    return pack_values(np.concatenate(arrays), kind) if arrays else ""
 
 
 def roof_places(model: BuildingModel, part: np.ndarray, types: list[str]) -> list[int]:
@@ -158,18 +153,15 @@ def roof_places(model: BuildingModel, part: np.ndarray, types: list[str]) -> lis
 def point_data(run: EvaluatedRun, origin: np.ndarray) -> dict[str, str]:
     """Return every k-th point (n, 3) of each building with its distance to the roof (n,)."""
     largest = max(1, min(POINTS_PER_BUILDING, MOST_REPORT_POINTS // max(len(run.models), 1)))
-    places, distances = [np.empty((0, 3))], [np.empty(0)]
+    places, distances = [], []
     for model, points in zip(run.models, run.points, strict=True):
         points = points[:: max(1, -(-len(points) // largest))]
         places.append(points - origin)
         distances.append(
             psd(model.solid, points) if model.solid is not None else np.full(len(points), np.inf)
         )
-    nearness = np.nan_to_num(np.concatenate(distances), posinf=9.0)
-    return {
-        "places": pack_values(np.concatenate(places), "<f4"),
-        "distances": pack_values(nearness, "<f4"),
-    }
+    nearness = [np.nan_to_num(values, posinf=9.0) for values in distances]
+    return {"places": pack_all(places, "<f4"), "distances": pack_all(nearness, "<f4")}
 
 
 def places_on_map(run: EvaluatedRun) -> list[shapely.Geometry | None]:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from html import escape
 
 import numpy as np
 
+from ..data_files import draw_rings
 from ..geometry.rings import ring_normal
 from ..model import GROUND, ROOF, Solid
 from ..write.colours import RESIDUAL_STOPS
@@ -87,16 +88,12 @@ def building_pictures(
     across = slope_direction(solid)
     along = np.array([-across[1], across[0], 0.0])
     colours = [choose_look(face, part_types).colour for face in solid.faces]
-    above = (
-        0.8 * across + 0.6 * along,
-        0.5 * (0.8 * along - 0.6 * across) + [0.0, 0.0, np.sqrt(0.75)],
-    )
-    side = (across, np.array([0.0, 0.0, 1.0]))
-    visited = (("from above", above), ("from the side", side))
-    return "".join(
-        projection(solid, colours, points, distances, right, vertical, label)
-        for label, (right, vertical) in visited
-    )
+    right = 0.8 * across + 0.6 * along
+    vertical = 0.5 * (0.8 * along - 0.6 * across) + [0.0, 0.0, np.sqrt(0.75)]
+    up = np.array([0.0, 0.0, 1.0])
+    return projection(
+        solid, colours, points, distances, right, vertical, "from above"
+    ) + projection(solid, colours, points, distances, across, up, "from the side")
 
 
 def slope_direction(solid: Solid) -> np.ndarray:
@@ -148,28 +145,16 @@ def projection(
         key=lambda drawn: float((solid.vertices[list(drawn[0].rings[0])] @ towards).mean()),
     )
     shapes = "".join(
-        f'<path d="{ring_paths(place(corners), face.rings)}" fill="{colour}"/>'
+        f'<path d="{draw_rings(place(corners[list(r)]) for r in face.rings)}" fill="{colour}"/>'
         for face, colour in faces
     )
-    cloud = "".join(
-        f'<path d="{dot_paths(place(dots[residual_bins(distances) == i]))}" stroke="{stop}"/>'
-        for i, (_, stop) in enumerate(RESIDUAL_STOPS)
-    )
+    bins, cloud = residual_bins(distances), ""
+    for i, (_, stop) in enumerate(RESIDUAL_STOPS):
+        path = "".join(f"M{x:.1f} {y:.1f}h0" for x, y in place(dots[bins == i]))
+        cloud += f'<path d="{path}" stroke="{stop}"/>'
     return (
         f'<svg viewBox="0 0 {CHART_WIDTH} {CHART_HEIGHT}" class="model" role="img" '
         f'aria-label="{label}"><g '
         f'class="faces">{shapes}</g>'
         f'<g class="dots">{cloud}</g></svg>'
-    )
-
-
-def dot_paths(xy: np.ndarray) -> str:
-    """Draw a dot at each of the points (n, 2), as the data of an SVG path."""
-    return "".join(f"M{x:.1f} {y:.1f}h0" for x, y in xy)
-
-
-def ring_paths(xy: np.ndarray, rings: Sequence[Sequence[int]]) -> str:
-    """Return SVG path data of a face."""
-    return "".join(
-        "M" + "L".join(f"{xy[i, 0]:.1f} {xy[i, 1]:.1f}" for i in ring) + "Z" for ring in rings
     )

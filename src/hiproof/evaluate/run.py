@@ -33,36 +33,36 @@ from .models import BuildingModel, read_models, run_models
 
 NUMBER = (int, float)
 # What of run.json is used, and what it must be where it is there.
-RECORD: dict[tuple[str, ...], Any] = {
-    ("settings",): dict,
-    ("settings", "read"): dict,
-    ("settings", "read", "building_classes"): list,
-    ("settings", "read", "crs"): str,
-    ("settings", "read", "unit"): str,
-    ("settings", "write"): dict,
-    ("settings", "write", "out_crs"): str,
-    ("settings", "reconstruct"): dict,
-    ("inputs",): dict,
-    ("inputs", "clouds"): list,
-    ("inputs", "footprints"): str,
-    ("inputs", "layer"): (str, int),
-    ("inputs", "id_attribute"): str,
-    ("inputs", "where"): str,
-    ("inputs", "bbox"): list,
-    ("inputs", "terrain"): str,
-    ("inputs", "overrides"): str,
-    ("inputs", "started_in"): str,
-    ("crs",): str,
-    ("epochs",): dict,
-    ("update",): dict,
-    ("update", "shift"): dict,
-    ("summary",): dict,
-    ("summary", "buildings"): NUMBER,
-    ("summary", "modelled"): NUMBER,
-    ("summary", "share_within_20cm_median"): NUMBER,
-    ("summary", "share_within_20cm_worst_tenth"): NUMBER,
-    ("summary", "needs_attention"): dict,
-    **{("summary", "needs_attention", kind.code): NUMBER for kind in Attention},
+RECORD: dict[str, Any] = {
+    "settings": dict,
+    "settings.read": dict,
+    "settings.read.building_classes": list,
+    "settings.read.crs": str,
+    "settings.read.unit": str,
+    "settings.write": dict,
+    "settings.write.out_crs": str,
+    "settings.reconstruct": dict,
+    "inputs": dict,
+    "inputs.clouds": list,
+    "inputs.footprints": str,
+    "inputs.layer": (str, int),
+    "inputs.id_attribute": str,
+    "inputs.where": str,
+    "inputs.bbox": list,
+    "inputs.terrain": str,
+    "inputs.overrides": str,
+    "inputs.started_in": str,
+    "crs": str,
+    "epochs": dict,
+    "update": dict,
+    "update.shift": dict,
+    "summary": dict,
+    "summary.buildings": NUMBER,
+    "summary.modelled": NUMBER,
+    "summary.share_within_20cm_median": NUMBER,
+    "summary.share_within_20cm_worst_tenth": NUMBER,
+    "summary.needs_attention": dict,
+    **{f"summary.needs_attention.{kind.code}": NUMBER for kind in Attention},
 }
 
 
@@ -83,10 +83,8 @@ class EvaluatedRun:
 
     def only(self, indices: Sequence[int]) -> EvaluatedRun:
         """Return the same run with only these buildings."""
-        models = tuple(self.models[i] for i in indices)
-        points = tuple(self.points[i] for i in indices)
-        figures = tuple(self.figures[i] for i in indices)
-        footprints = tuple(self.footprints[i] for i in indices)
+        columns: tuple[Any, ...] = (self.models, self.points, self.figures, self.footprints)
+        models, points, figures, footprints = (tuple(c[i] for i in indices) for c in columns)
         return EvaluatedRun(models, points, figures, self.record, footprints, self.clouds)
 
 
@@ -177,14 +175,14 @@ def list_run_inputs(run: Path) -> list[str]:
 
 def refuse_other_kinds(record: dict[str, Any]) -> None:
     """Raise InputError where a value of the record has another kind than RECORD."""
-    for names, kind in RECORD.items():
+    for place, kind in RECORD.items():
         value: Any = record
-        for name in names:
+        for name in place.split("."):
             value = value.get(name) if value is not None else None
         is_odd = isinstance(value, bool) or (isinstance(value, float) and not math.isfinite(value))
         if value is not None and (is_odd or not isinstance(value, kind)):
             text = {dict: "an object", list: "a list", NUMBER: "a finite number"}.get(kind, "text")
-            raise InputError(f"expected {text} as {'.'.join(names)}, got {excerpt(value)}")
+            raise InputError(f"expected {text} as {place}, got {excerpt(value)}")
     refuse_other_surveys(record)
     bbox = (record.get("inputs") or {}).get("bbox")
     if bbox and (len(bbox) != 4 or not all(type(side) in NUMBER for side in bbox)):

@@ -32,7 +32,7 @@ from ..model.heights import find_highest
 from ..status import Doubt, Grade
 from .distance import point_surface_distances
 from .layers import unseen_share
-from .metrics import FACADE_M, NEAR_M, well_inside
+from .metrics import FACADE_M, NEAR_M, list_rings, well_inside
 
 # Share of the roof points within NEAR_M of the roof, below which a model is fair, and poor. Roofs
 # of old towns that look right have 0.75 to 0.9: gutters, parapets, chimneys.
@@ -195,10 +195,8 @@ def collect_evidence(model: Model, points: np.ndarray, unused: np.ndarray) -> Ev
     floor = model.solid.vertices[:, 2].min() - roof.frame.origin[2]
     dz = everything[:, 2] - np.maximum(z_roof, floor)  # where no part is the model shows ground
     on_roof = np.abs(dz) < NEAR_M
-    is_off = ~on_roof
-    is_off[is_off] = (
-        point_surface_distances(everything[is_off], wall_rings(model), at_most=FACADE_M) >= FACADE_M
-    )
+    is_off, walls = ~on_roof, list_rings(model.solid.move(-roof.frame.origin), WALL)
+    is_off[is_off] = point_surface_distances(everything[is_off], walls, FACADE_M) >= FACADE_M
     counts, area_m2 = on_roof | is_off, roof.outline.area
     mask = np.arange(len(everything)) < len(points)
     roof_points = points[counts[mask]]
@@ -226,14 +224,6 @@ def collect_evidence(model: Model, points: np.ndarray, unused: np.ndarray) -> Ev
         unsupported_m2=float(shown_m2[is_guess].sum()),
         area_m2=area_m2,
     )
-
-
-def wall_rings(model: Model) -> list[list[np.ndarray]]:
-    """Return the walls of a model as lists of rings (m, 3), in its roof's frame."""
-    vertices = model.solid.vertices - model.roof.frame.origin
-    return [
-        [vertices[list(ring)] for ring in face.rings] for face in model.solid.select_faces(WALL)
-    ]
 
 
 def is_tilted(points: np.ndarray, dz: np.ndarray) -> bool:
