@@ -18,6 +18,7 @@ from ..model import Building
 from ..parametric.building import build
 from ..primitives.catalogue import CATALOGUE
 from ..primitives.revolved import NECK
+from ..primitives.table import PARAMETER_ROWS, evaluate
 from .view import (
     SeenFace,
     bound_sphere,
@@ -93,28 +94,13 @@ def place_measure(name: str, p: dict[str, float], highest: np.ndarray) -> Measur
     `highest` (k, 3) are the corners of the roof's ridge or top. A parameter that no line is known
     for is only named, beside the roof.
     """
-    u, v, h = p["length"] / 2, p["width"] / 2, p.get("height", 0.0)
+    u, v, ends = p["length"] / 2, p["width"] / 2, PARAMETER_ROWS.get(name, {}).get("ends")
+    if ends is None:
+        return Measure(name, np.array([0.0, v + 0.5, p.get("height", 0.0)]))
     (x0, y0, _), (x1, y1, _) = highest.min(axis=0), highest.max(axis=0)
-    half_break, z_break = p.get("break_width", 0) / 2, p.get("break_height", 0)
-    ends = {
-        "width": ((u + ASIDE, -v, -DRAWN_WALL), (u + ASIDE, v, -DRAWN_WALL)),
-        "length": ((-u, -v - ASIDE, -DRAWN_WALL), (u, -v - ASIDE, -DRAWN_WALL)),
-        "height": ((x1, y0, 0), (x1, y0, h)),
-        "end_height": ((-u, -v, 0), (-u, -v, p.get("end_height", 0))),
-        "ridge_length": ((x0, y0, h), (x1, y1, h)),
-        "hip_height": ((u, 0, h - p.get("hip_height", 0)), (u, 0, h)),
-        "top_width": ((x1, y0, h), (x1, y1, h)),
-        "top_length": ((x0, y0, h), (x1, y0, h)),
-        "ridge_offset": ((u, 0, h), (u, p.get("ridge_offset", 0), h)),
-        "eave_step": ((u + 0.3, v, 0), (u + 0.3, v, p.get("eave_step", 0))),
-        "break_width": ((u, -half_break, z_break), (u, half_break, z_break)),
-        "break_height": ((u, half_break, 0), (u, half_break, z_break)),
-        "neck_height": ((NECK * u, 0, 0), (NECK * u, 0, p.get("neck_height", 0))),
-    }
-    if name not in ends:
-        return Measure(name, np.array([0.0, v + 0.5, h]))
-    start, end = ends[name]
-    return Measure(name, np.array(start, float), np.array(end, float))
+    names = {"u": u, "v": v, "x0": x0, "y0": y0, "x1": x1, "y1": y1}
+    names |= {"aside": ASIDE, "wall": DRAWN_WALL, "neck": NECK}
+    return Measure(name, *np.array(evaluate(ends, {**p, **names}), float))
 
 
 def primitive_svg(kind: str) -> str:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
-from ..data_files import fill_page, read_asset
+from ..data_files import fill_page, read_asset, read_data_file
 from ..errors import escape_unseen
 from ..log import count_things
 from ..masking import masked_values
@@ -35,57 +35,7 @@ WORST = 20  # buildings shown with pictures: as many as are read to the end
 # Buildings on the map and in the 3D view, about 10 kB each: beyond this, browsers grow slow.
 MOST_SHOWN = 10_000
 
-DISTRIBUTIONS = (
-    ("psd_mean", "mean distance of a building's points, facades included", "m"),
-    ("p95", "95th percentile of the distances", "m"),
-    ("share_within_20cm", "share of points 0.3 m inside the outline within 0.2 m of the roof", ""),
-    ("outline_iou", "outline IoU: overlap of roof and footprint, 1 where equal", ""),
-    ("density", "points per square metre", ""),
-    ("volume_m3", "volume", "m³"),
-)
-TABLE_FIGURES = {
-    "psd_mean": "mean distance, m",
-    "psd_std": "standard deviation, m",
-    "rmse": "root mean square, m",
-    "p95": "95 of 100 closer than, m",
-    "share_within_20cm": "share within 0.2 m",
-    "outline_iou": "outline IoU",
-}
-
-# What a mapper does next, by class of change, or kind of a roof outside all outlines.
-NEXT_STEPS = {
-    "uncertain": (
-        "building",
-        "uncertain: points contradict the model, but show no clear roof. "
-        "<code>hiproof edit RUN</code> lists them first.",
-    ),
-    "changed": (
-        "building",
-        "changed and modelled again. The largest changes are drawn below; "
-        "correct what is wrong with <code>hiproof edit RUN</code>.",
-    ),
-    "new": ("building", "new, with a first model. Check them in the same way."),
-    "gone": ("building", "gone. Take them out of your map and your register."),
-    "built": (
-        "roof",
-        "new and without a footprint. Draw footprints over the class <code>outside</code> of "
-        "<code>changes.gpkg</code>, and update again with <code>--footprints</code>.",
-    ),
-    "extended": ("roof", "new beside a building. Extend its footprint, and update again."),
-    "unmapped": (
-        "roof",
-        "without a footprint in both surveys. <code>changes.csv</code> lists them "
-        "by size, with height and confidence; draw footprints for those that you map.",
-    ),
-    "demolished": (
-        "roof",
-        "without a footprint and gone. Take them out of your map if it has them.",
-    ),
-    "not_covered": (
-        "building",
-        "not covered by the new survey, or not in all parts. Their models are the earlier ones.",
-    ),
-}
+TEXTS = read_data_file("run")
 
 
 def write_report(
@@ -164,7 +114,7 @@ def list_next_steps(run: EvaluatedRun) -> str:
     counts = {**(update.get("by_change") or {}), **(update.get("roofs_outside") or {})}
     rows = "".join(
         f"<li><strong>{count_things(counts[name], thing)}</strong> {text}</li>"
-        for name, (thing, text) in NEXT_STEPS.items()
+        for name, (thing, text) in TEXTS["next_steps"].items()
         if counts.get(name)
     )
     rows = rows or "<li>Nothing: no building changed.</li>"
@@ -234,18 +184,18 @@ def figure_table(run: EvaluatedRun) -> str:
         (
             f'<th scope="row">{escape(describe_type(kind))}</th>',
             figures["buildings"],
-            *(f"{figures[k]['mean']:.3f}" if k in figures else "" for k in TABLE_FIGURES),
+            *(f"{figures[k]['mean']:.3f}" if k in figures else "" for k in TEXTS["means"]),
         )
         for kind, figures in summarise(run.figures).items()
     ]
-    return make_table(("type", "buildings", *TABLE_FIGURES.values()), rows)
+    return make_table(("type", "buildings", *TEXTS["means"].values()), rows)
 
 
 def distributions(run: EvaluatedRun) -> str:
     rows = [figures.row() for figures in run.figures]
     return "".join(
         histogram(np.array([row[name] for row in rows]), title, unit)
-        for name, title, unit in DISTRIBUTIONS
+        for name, (title, unit) in TEXTS["distributions"].items()
     )
 
 

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import shapely
 
+from ..data_files import read_data_file
 from ..errors import InputError, InputWarning, SettingsError
 from ..frames import Units
 from ..read.crs import find_units, parse_crs
@@ -32,37 +33,13 @@ from .metrics import plan_outline
 from .models import BuildingModel, read_models, run_models
 
 NUMBER = (int, float)
-# What of run.json is used, and what it must be where it is there.
-RECORD: dict[str, Any] = {
-    "settings": dict,
-    "settings.read": dict,
-    "settings.read.building_classes": list,
-    "settings.read.crs": str,
-    "settings.read.unit": str,
-    "settings.write": dict,
-    "settings.write.out_crs": str,
-    "settings.reconstruct": dict,
-    "inputs": dict,
-    "inputs.clouds": list,
-    "inputs.footprints": str,
-    "inputs.layer": (str, int),
-    "inputs.id_attribute": str,
-    "inputs.where": str,
-    "inputs.bbox": list,
-    "inputs.terrain": str,
-    "inputs.overrides": str,
-    "inputs.started_in": str,
-    "crs": str,
-    "epochs": dict,
-    "update": dict,
-    "update.shift": dict,
-    "summary": dict,
-    "summary.buildings": NUMBER,
-    "summary.modelled": NUMBER,
-    "summary.share_within_20cm_median": NUMBER,
-    "summary.share_within_20cm_worst_tenth": NUMBER,
-    "summary.needs_attention": dict,
-    **{f"summary.needs_attention.{kind.code}": NUMBER for kind in Attention},
+# What data/run.toml says of values of run.json.
+KINDS: dict[str, Any] = {
+    "an object": dict,
+    "a list": list,
+    "text": str,
+    "text or a number": (str, int),
+    "a finite number": NUMBER,
 }
 
 
@@ -174,14 +151,17 @@ def list_run_inputs(run: Path) -> list[str]:
 
 
 def refuse_other_kinds(record: dict[str, Any]) -> None:
-    """Raise InputError where a value of the record has another kind than RECORD."""
-    for place, kind in RECORD.items():
+    """Raise InputError where a value of the record is no such as data/run.toml says."""
+    kinds = read_data_file("run")["record"] | {
+        f"summary.needs_attention.{kind.code}": "a finite number" for kind in Attention
+    }
+    for place, text in kinds.items():
         value: Any = record
         for name in place.split("."):
             value = value.get(name) if value is not None else None
         is_odd = isinstance(value, bool) or (isinstance(value, float) and not math.isfinite(value))
-        if value is not None and (is_odd or not isinstance(value, kind)):
-            text = {dict: "an object", list: "a list", NUMBER: "a finite number"}.get(kind, "text")
+        if value is not None and (is_odd or not isinstance(value, KINDS[text])):
+            text = text.removesuffix(" or a number")
             raise InputError(f"expected {text} as {place}, got {excerpt(value)}")
     refuse_other_surveys(record)
     bbox = (record.get("inputs") or {}).get("bbox")

@@ -20,15 +20,10 @@ from ..errors import InputError
 from ..geometry.rings import intersect, join, repair_polygons, subtract, unite
 from ..model import Roof
 from ..primitives.cants import keep_cants_in_place
+from ..primitives.table import PARAMETER_ROWS
 from ..write.parameters import outline_record
-from .change import leave_out, make_polygon, with_sizes
+from .change import PLAN_SIZES, leave_out, make_polygon, with_sizes
 from .record import list_at, number, numbers_by_name, place, polygon
-
-# Parameters that grow with a side of the rectangle.
-INNER = {
-    "length": ("ridge_length", "top_length"),
-    "width": ("top_width", "break_width", "ridge_offset"),
-}
 
 GRID_M = 1e-4  # m; the grid on which solids are composed
 FAR_M = 1e4  # m; beyond any building, for a half plane drawn as a rectangle
@@ -56,7 +51,7 @@ def split_part(
     ...     share=0.25)]
     [(3.0, -4.5), (9.0, 1.5)]
     """
-    if side not in INNER or not 0.0 < share < 1.0:
+    if side not in PLAN_SIZES or not 0.0 < share < 1.0:
         raise InputError(
             f"expected a cut across length or width at a share of it between 0 and 1, got {side}, "
             f"{share}"
@@ -153,9 +148,9 @@ def find_axis(part: dict[str, Any], side: str) -> np.ndarray:
 def resize_rectangle(parameters: dict[str, float], side: str, size: float) -> dict[str, float]:
     """Return parameters with another `side`, scaling all that lies within it."""
     grown = {
-        name: parameters[name] * size / parameters[side]
-        for name in INNER[side]
-        if name in parameters
+        name: value * size / parameters[side]
+        for name, value in parameters.items()
+        if PARAMETER_ROWS.get(name, {}).get("side") == side
     }
     return {**parameters, **grown, side: size}
 

@@ -23,6 +23,7 @@ from ..errors import FitError, InputError
 from ..model import Building, Part, Roof, as_xyz
 from ..primitives.catalogue import CURVED
 from ..primitives.parameters import SIDED, refuse_no_shape
+from ..primitives.table import PARAMETER_ROWS, evaluate
 from ..write.parameters import building_record
 from .change import from_lowest_eave
 from .edit import rebuild
@@ -130,22 +131,11 @@ def list_unknowns(parts: tuple[Part, ...], fixed: Mapping[int, Collection[str]])
 
 def find_bounds(name: str, parameters: Mapping[str, float]) -> tuple[float, float]:
     """Return the bounds in which a parameter makes a roof over its rectangle."""
-    width, length = parameters.get("width", UNBOUNDED_M), parameters.get("length", UNBOUNDED_M)
-    return {
-        "ridge_length": (0.0, 0.98 * length),
-        "top_length": (0.0, 0.98 * length),
-        "top_width": (0.0, 0.98 * width),
-        "break_width": (0.02 * width, 0.98 * width),
-        "ridge_offset": (-0.45 * width, 0.45 * width),
-        "eave_step": (-UNBOUNDED_M, UNBOUNDED_M),
-    }.get(
-        name,
-        PITCHES_DEG
-        if name.startswith("pitch_")
-        else (-UNBOUNDED_M, UNBOUNDED_M)
-        if name.startswith("eave_")
-        else (LEAST_HEIGHT_M, UNBOUNDED_M),
-    )
+    if bounds := PARAMETER_ROWS.get(name, {}).get("bounds"):
+        return evaluate(bounds, {"width": UNBOUNDED_M, "length": UNBOUNDED_M} | dict(parameters))
+    if name.startswith("pitch_"):
+        return PITCHES_DEG
+    return (-UNBOUNDED_M if name.startswith("eave_") else LEAST_HEIGHT_M, UNBOUNDED_M)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Make roof shapes of the rows of data/shapes.toml, which explains its columns."""
+"""Make roof shapes of the rows of data/shapes.toml, which explains its columns; measures.toml."""
 
 from __future__ import annotations
 
@@ -36,6 +36,7 @@ LIMITS = {
 }
 BASICS: dict[str, Any] = {"__builtins__": {}, "pi": math.pi, "min": min, "max": max, "range": range}
 SHAPE_ROWS: dict[str, dict[str, Any]] = read_data_file("shapes")
+PARAMETER_ROWS: dict[str, dict[str, str]] = read_data_file("measures")
 for name, row in SHAPE_ROWS.items():
     SHAPE_ROWS[name] = SHAPE_ROWS.get(row.get("like", ""), {}) | row
 
