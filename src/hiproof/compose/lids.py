@@ -61,7 +61,13 @@ def close_lids(lids: Sequence[Lid], reach: float = ON_EDGE_UNITS) -> Solid:
             corners |= {start, end}
     walls_drawn = [Lid([loop], WALL) for loop in loops]
     divided = [
-        lid._replace(rings=[follow_chains(ring, chains) for ring in lid.rings]) for lid in lids
+        lid._replace(
+            rings=[
+                [corner for edge in list_edges(ring) for corner in chains[edge][:-1]]
+                for ring in lid.rings
+            ]
+        )
+        for lid in lids
     ]
     return number_corners(keep_corners(lid, corners) for lid in [*divided, *walls_drawn])
 
@@ -238,11 +244,6 @@ def simple_loops(ring: list[Item]) -> list[list[Item]]:
         path.append(vertex)
     loops.append(path)
     return loops
-
-
-def follow_chains(ring: list[Corner], chains: dict[Edge, list[Corner]]) -> list[Corner]:
-    """Return a ring with the corners over all places on its edges."""
-    return [corner for edge in list_edges(ring) for corner in chains[edge][:-1]]
 
 
 def number_corners(lids: Iterable[Lid]) -> Solid:

@@ -14,7 +14,7 @@ from ..primitives.ribs import draw_facets
 from ..settings import ComposeSettings, Settings
 from .arrangement import GRID_M
 from .cells import PlanProblem, arrange, plan_problem
-from .check import Finding, check_solid
+from .check import check_solid
 from .shell import Saddles, raise_shell
 
 
@@ -75,18 +75,13 @@ def compose(roof: Roof, z_ground_local: float, settings: Settings | None = None)
             return solid
         codes = sorted({str(finding.code) for finding in findings})
         failure = f"one that is none by ISO 19107 (code {', '.join(codes)})"
-        parts = parts or parts_at_fault(solid, findings)
+        at_fault = {solid.faces[finding.face].part for finding in findings if finding.face >= 0}
+        parts = parts or tuple(sorted(at_fault - {-1}))
     refusal = CompositionError(
         f"expected the roof to become a valid solid, got: {failure}; fall back to a simpler roof"
     )
     refusal.parts = parts
     raise refusal
-
-
-def parts_at_fault(solid: Solid, findings: tuple[Finding, ...]) -> tuple[int, ...]:
-    """Return ascending numbers of the roof parts whose faces have a finding."""
-    parts = {solid.faces[finding.face].part for finding in findings if finding.face >= 0}
-    return tuple(sorted(parts - {-1}))
 
 
 def compose_at(

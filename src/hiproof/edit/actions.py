@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,6 +20,7 @@ from ..settings import Settings
 from ..status import Status
 
 Record = Mapping[str, Any]
+ACTIONS = ("show", "change", "remove", "split", "merge", "dormer", "recess", "refit")  # of Edit
 
 
 def apply_edit(
@@ -42,7 +43,7 @@ def apply_edit(
     action = require_mapping(requested, "an edit").get("action")
     if action not in ACTIONS:
         raise InputError(f"expected an edit ({', '.join(ACTIONS)}), got {action!r:.40}; choose one")
-    parts = ACTIONS[action](Edit(record, list_at(record, "parts"), requested, points))
+    parts = getattr(Edit(record, list_at(record, "parts"), requested, points), action)()
     result = build(
         {**record, "status": Status.MODELLED.code, "quality": None, "detail": BY_HAND}
         | {"parts": parts},
@@ -143,15 +144,3 @@ class Edit(NamedTuple):
             raise InputError(
                 f"expected held as names by part, got {error}; give part numbers and lists"
             ) from error
-
-
-ACTIONS: dict[str, Callable[[Edit], list]] = {
-    "show": Edit.show,
-    "change": Edit.change,
-    "remove": Edit.remove,
-    "split": Edit.split,
-    "merge": Edit.merge,
-    "dormer": Edit.dormer,
-    "recess": Edit.recess,
-    "refit": Edit.refit,
-}

@@ -172,14 +172,9 @@ class Desk:
 
     def accept(self, id: str, body: Mapping[str, Any]) -> dict[str, Any]:
         """Keep the page's building as an override, if the page knows its `version`."""
-        override = {
-            "id": id,
-            **(
-                self.make_exclusion(id)
-                if body.get("leave_out") is True
-                else self.make_override(id, body)
-            ),
-        }
+        self.run.record(id)
+        is_out = body.get("leave_out") is True
+        override = {"id": id} | ({"leave_out": True} if is_out else self.make_override(id, body))
         current = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
         note = plain_text(text_at(body, "note")).strip()[:MOST_NOTE]
         override |= {"who": self.who, "when": current} | ({"note": note} if note else {})
@@ -197,11 +192,6 @@ class Desk:
             else [name for name in BELONGS if name != "z_ground"]
         )
         return {name: record[name] for name in override}
-
-    def make_exclusion(self, id: str) -> dict[str, Any]:
-        """Return the override that leaves a building of the run without a model."""
-        self.run.record(id)
-        return {"leave_out": True}
 
     def withdraw(self, id: str, body: Mapping[str, Any]) -> dict[str, Any]:
         """Take an accepted edit back: the building is the run's again."""

@@ -159,7 +159,11 @@ def enrich_run(
     waiting = make_waiting_folder(out, parameters, settings)
     with atomic_file(waiting / "index.npz") as file:
         np.savez(file, **index._asdict())
-    blocks = list_blocks(waiting, len(records))
+    total = len(records)
+    blocks = [
+        (waiting / f"{first}.npz", first, min(first + BLOCK_BUILDINGS, total))
+        for first in range(0, total, BLOCK_BUILDINGS)
+    ]
     enrich_blocks(str(parameters), settings, blocks, processes, progress)
     files, failures = join_blocks(blocks, find_head(records, settings), out)
     result = Enriched(list(files.values()), len(records), failures)
@@ -189,7 +193,7 @@ def enrich_blocks(
     processes: int | None,
     progress: Callable[[int, int], None],
 ) -> None:
-    """Make the blocks that are missing, in parallel."""
+    """Make the missing blocks in parallel: files, and the numbers [first, last) of buildings."""
     missing = [block for block in blocks if not block[0].is_file()]
     total = blocks[-1][2] if blocks else 0
     done = total - sum(last - first for _, first, last in missing)
@@ -240,14 +244,6 @@ def make_waiting_folder(out: Path, parameters: Path, settings: EnrichSettings) -
             f"expected to write into {out}, got: {error}; choose another --out"
         ) from error
     return waiting
-
-
-def list_blocks(waiting: Path, total: int) -> list[tuple[Path, int, int]]:
-    """Return the file of each block with the numbers of its buildings, [first, last)."""
-    return [
-        (waiting / f"{first}.npz", first, min(first + BLOCK_BUILDINGS, total))
-        for first in range(0, total, BLOCK_BUILDINGS)
-    ]
 
 
 def enrich_block(

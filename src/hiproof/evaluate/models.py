@@ -147,7 +147,9 @@ def read_building(id: str, city_object: Any, feature: Feature) -> BuildingModel:
         for geometries in solids
         for surface in surfaces_at(geometries, level, len(feature.vertices))
     ]
-    attributes = plain_attributes(city_object.get("attributes"))
+    attributes = city_object.get("attributes") or {}
+    if not isinstance(attributes, dict):
+        raise ValueError(f"{excerpt(attributes)} as its attributes")
     part_types = {
         read_part_number(s): str(s.semantics[PART_TYPE])
         for s in surfaces
@@ -159,7 +161,8 @@ def read_building(id: str, city_object: Any, feature: Feature) -> BuildingModel:
     solid = compact(feature.vertices, faces) if faces else None
     joined = join_shells(solid, family) if solid is not None else None
     suns = read_suns(surfaces) if joined is solid else ()
-    model = BuildingModel(id, attributes, joined, suns=suns)
+    # a number beyond all bounds is none
+    model = BuildingModel(id, finite(attributes), joined, suns=suns)
     return replace(model, part_types={0: model.roof_type} | part_types)
 
 
@@ -176,13 +179,6 @@ def is_part(child: Any, feature: Feature) -> bool:
     return found is not None and not (
         isinstance(found, dict) and found.get("type") == "BuildingInstallation"
     )
-
-
-def plain_attributes(attributes: Any) -> dict[str, Any]:
-    """Read attributes; a number beyond all bounds is none."""
-    if not isinstance(attributes or {}, dict):
-        raise ValueError(f"{excerpt(attributes)} as its attributes")
-    return finite(attributes or {})
 
 
 def usable(model: BuildingModel, must_be_valid: bool) -> BuildingModel:

@@ -10,10 +10,6 @@ import numpy as np
 KEY_OF_CELL = np.array([2**32, 1])
 AROUND_KEYS = np.array([(u, v) for u in (-1, 0, 1) for v in (-1, 0, 1)]) @ KEY_OF_CELL
 
-LARGEST_TABLE = 8
-"""Cells of the box around a cell's members, for each of these, up to which a table of the box
-numbers them: it takes a fifth of the time of a sort."""
-
 
 def number_cells(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Number the distinct cells among `cells` (n, 2), by column, then by row.
@@ -33,13 +29,7 @@ def number_cells(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     low = cells.min(axis=0)
     column, row = (cells - low).T
     rows = int(row.max()) + 1
-    keys = column * rows + row
-    if (int(column.max()) + 1) * rows <= LARGEST_TABLE * len(cells):
-        is_occupied = np.zeros(int(keys.max()) + 1, bool)
-        is_occupied[keys] = True
-        occupied, number = np.flatnonzero(is_occupied), (np.cumsum(is_occupied) - 1)[keys]
-    else:
-        occupied, number = np.unique(keys, return_inverse=True)
+    occupied, number = np.unique(column * rows + row, return_inverse=True)
     return np.column_stack(np.divmod(occupied, rows)) + low, number
 
 

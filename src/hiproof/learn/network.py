@@ -67,7 +67,7 @@ class SetAbstraction(nn.Module):
     def forward(self, x, position, centres, group):
         """Return features (S, outputs) of (rows, C) and positions over the radius (rows, 3)."""
         source = self.features(x) + self.position(position)
-        grouped = torch.relu(gather_rows(source, group) - self.position(centres).unsqueeze(1))
+        grouped = torch.relu(source[group] - self.position(centres).unsqueeze(1))
         return torch.relu(self.norm(self.second(grouped).max(dim=1)[0]))
 
 
@@ -90,9 +90,7 @@ class FeaturePropagation(nn.Module):
         Inputs are coarse (rows, C) and fine features (S, D), interpolation `index` and `weight` (S,
         3).
         """
-        joined = (gather_rows(self.coarse(coarse), index) * weight.unsqueeze(-1)).sum(
-            dim=1
-        ) + self.fine(fine)
+        joined = (self.coarse(coarse)[index] * weight.unsqueeze(-1)).sum(dim=1) + self.fine(fine)
         return torch.relu(self.norm(joined))
 
 
@@ -156,11 +154,6 @@ class RoofNetwork(nn.Module):
         )
         fine = self.up[1](middle, levels[0], up_index2, up_weight2)
         return self.point_head(self.dropout(fine)), self.type_head(building)
-
-
-def gather_rows(x, index):
-    """Return rows of `x` (rows, C) by `index` (S, K): (S, K, C)."""
-    return x[index]
 
 
 def network_inputs(arrangements: list[Arrangement], layout: Layout) -> tuple[torch.Tensor, ...]:

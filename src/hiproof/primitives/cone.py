@@ -7,7 +7,7 @@ is the depth of the plan: half of the width over a half circle.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cache
 
 from .contract import Primitive
@@ -45,20 +45,19 @@ def make_half_cone(sides: int) -> Primitive:
     return make_shape("half_cone", constants, rim=rim)
 
 
-def measure_extent(p: Mapping[str, float]) -> float:
-    """Return the longer diameter (m) of the whole ellipse of a half cone."""
-    return max(p["width"], 2.0 * p["length"])
+def make_round(
+    make: Callable[[int], Primitive], measure: Callable[[Mapping[str, float]], float]
+) -> Primitive:
+    """Return the shape with as many facets as its diameter (m), by `measure`, asks for."""
+    return with_facets(
+        make,
+        choose=lambda p: count_sides(measure(p)),
+        refine=lambda p, chord_m: make(find_sides(measure(p) / 2, chord_m)),
+    )
 
 
-CONE = with_facets(
-    make_cone,
-    choose=lambda p: count_sides(p["length"]),
-    refine=lambda p, chord_m: make_cone(find_sides(p["length"] / 2, chord_m)),
-)
-HALF_CONE = with_facets(
-    make_half_cone,
-    choose=lambda p: count_sides(measure_extent(p)),
-    refine=lambda p, chord_m: make_half_cone(find_sides(measure_extent(p) / 2, chord_m)),
-)
+CONE = make_round(make_cone, lambda p: p["length"])
+# by the longer diameter of the whole ellipse
+HALF_CONE = make_round(make_half_cone, lambda p: max(p["width"], 2.0 * p["length"]))
 BROACH = make_pointed("broach", BROACH_SIDES, 1.0)
 HEXAGONAL_SPIRE = make_pointed("hexagonal_spire", HEXAGON_SIDES, 1.0)

@@ -8,6 +8,7 @@ from importlib import resources
 from pathlib import Path
 
 import numpy as np
+import shapely
 
 from ..frames import turn_points
 from .relief import Relief
@@ -54,18 +55,13 @@ def neighbourhood(seed: int = DEMO_SEED) -> tuple[list[Lot], Relief]:
     buildings: list[SimBuilding] = []
     for names in STREETS:
         side = street_side(rng, names, start, heading, math.inf, math.inf, terrain)
-        top = max(depth_across(building, start, heading) for building in side)
+        corners = np.vstack([shapely.get_coordinates(building.footprint) for building in side])
+        top = float(turn_points(corners - start, -heading)[:, 1].max())
         start = start + turn_points(np.array([[0.0, top + STREET_WIDTH_M]]), heading)[0]
         buildings += side
     return [
         furnish_lot(rng, f"house-{k:02d}", building) for k, building in enumerate(buildings, 1)
     ], terrain
-
-
-def depth_across(building: SimBuilding, start: np.ndarray, heading: float) -> float:
-    """Return how far (m) a building reaches from a street that begins at `start` (2,)."""
-    corners = np.array(building.footprint.exterior.coords) - start
-    return float(turn_points(corners, -heading)[:, 1].max())
 
 
 def write_neighbourhood(folder: Path, seed: int = DEMO_SEED) -> dict[str, int]:

@@ -15,7 +15,7 @@ from ..frames import Box, turn_points
 from .flight import Swath, join_beams, make_beams
 from .relief import Relief
 from .scanner import Scan, ScanSettings, returns, with_outliers
-from .scene import SOURCE_GROUND, SOURCE_TREE
+from .scene import SOURCES
 from .town import Lot, town_scene
 
 CRS = "EPSG:7415"
@@ -23,7 +23,8 @@ PATCH_M = 100.0  # m, side of what is scanned at once: memory stays small for an
 OUTLIER_SHARE = 2e-4  # of the points: birds and multipath
 # a date that does not change, so that the same seed gives the same bytes
 EPOCH = datetime.date(2020, 1, 1)
-CLASS_GROUND, CLASS_TREE, CLASS_BUILDING = 2, 5, 6  # classes of ASPRS
+# Classes of ASPRS by source, as producers deliver: ground 2, trees 5, all that is built 6.
+CLASSES = np.array([{"ground": 2, "tree": 5}.get(source, 6) for source in SOURCES], np.uint8)
 
 
 @dataclass(frozen=True)
@@ -127,14 +128,6 @@ def surveyed_patch(
     return cloud.select(inside)
 
 
-def assign_classes(cloud: Scan) -> np.ndarray:
-    """Return ASPRS classes as producers deliver: ground 2, trees 5, all that is built 6."""
-    classes = np.full(len(cloud), CLASS_BUILDING, np.uint8)
-    classes[cloud.source == SOURCE_GROUND] = CLASS_GROUND
-    classes[cloud.source == SOURCE_TREE] = CLASS_TREE
-    return classes
-
-
 def write_laz(path: Path, clouds: Iterator[Scan], origin: np.ndarray) -> int:
     """Write clouds to one LAZ 1.4, streamed; return the count, OutputError if it cannot."""
     import laspy
@@ -152,7 +145,7 @@ def write_laz(path: Path, clouds: Iterator[Scan], origin: np.ndarray) -> int:
             for cloud in clouds:
                 record = laspy.ScaleAwarePointRecord.zeros(len(cloud), header=header)
                 record.x, record.y, record.z = cloud.points.T
-                record.classification = assign_classes(cloud)
+                record.classification = CLASSES[cloud.source]
                 record.return_number[:] = record.number_of_returns[:] = 1
                 writer.write_points(record)
                 count += len(cloud)
