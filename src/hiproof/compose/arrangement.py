@@ -12,12 +12,13 @@ twin of h is h ^ 1. Polygons are soups of edges (x0, y0, x1, y1) in any order; i
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
 
+from ..compiled import compiled
+from ..geometry.arrays import copy_row, copy_rows, sort_values
 from ..geometry.grid import KEY_OF_CELL
 
 GRID_M = 1e-4  # m; how CityJSON is rounded, so that what is checked is what is written
@@ -26,48 +27,66 @@ OUTSIDE, UNCOVERED = -1, -2  # labels of faces that no plane covers
 COLLINEAR_UNITS = 5.0
 
 
-def turn(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> Any:
-    """Return twice the signed areas of triangles abc (..., 2), exact for integers."""
-    way, off = b - a, c - a
-    return way[..., 0] * off[..., 1] - way[..., 1] * off[..., 0]
+@compiled
+def turn(a, b, c):
+    """Return twice the signed area of triangle abc, exact for integers; left is positive."""
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
-def is_beside(p: np.ndarray, a: np.ndarray, b: np.ndarray, reach: float) -> Any:
-    """Return whether places lie beside the inner part of segments ab (..., 2), within `reach`."""
-    way = b - a
-    along, length2 = (way * (p - a)).sum(axis=-1), (way * way).sum(axis=-1)
-    across = np.abs(turn(a, b, p)).astype(float)
-    return (along > 0) & (along < length2) & (across * across < reach * reach * length2)
+@compiled
+def is_beside(p, a, b, reach):
+    """Return whether `p` lies beside the inner part of segment ab, closer than `reach`."""
+    along, length2 = dot(a, b, p), dot(a, b, b)
+    across = float(turn(a, b, p))
+    return 0 < along < length2 and across * across < reach * reach * float(length2)
 
 
-def find_vertices_beside(xy: np.ndarray, a: int, b: int, reach: float) -> np.ndarray:
-    """Return the vertices of `xy` (n, 2) beside segment ab.
+@compiled
+def dot(a, b, c):
+    """Return the product of ab and ac."""
+    return (b[0] - a[0]) * (c[0] - a[0]) + (b[1] - a[1]) * (c[1] - a[1])
 
-    None is one that makes a small triangle with its ends, in which an end lies beside the edge from
+
+@compiled
+def crosses(a, b, c, d):
+    """Return whether line ab passes between `c` and `d`."""
+    return float(turn(a, b, c)) * float(turn(a, b, d)) < 0.0
+
+
+@compiled
+def find_vertex_beside(xy, a, b, reach):
+    """Return the vertex of `xy` (n, 2) beside segment ab nearest to a, else -1.
+
+    None is one that makes a small triangle with the ends, in which an end lies beside the edge from
     the vertex to the other end: its three edges would replace each other for ever.
     """
-    near = np.flatnonzero(is_beside(xy, xy[a], xy[b], reach))
-    is_small = is_beside(xy[a], xy[near], xy[b], reach) | is_beside(xy[b], xy[a], xy[near], reach)
-    return near[~is_small]
+    best = -1
+    for v in range(len(xy)):
+        if (
+            is_beside(xy[v], xy[a], xy[b], reach)
+            and (best < 0 or dot(xy[a], xy[b], xy[v]) < dot(xy[a], xy[b], xy[best]))
+            and not is_beside(xy[a], xy[v], xy[b], reach)
+            and not is_beside(xy[b], xy[a], xy[v], reach)
+        ):
+            best = v
+    return best
 
 
-def find_crossings(xy: np.ndarray, edges: np.ndarray, a: int, b: int) -> np.ndarray:
-    """Return the edges that properly cross segment ab, in their order."""
-    c, d = xy[edges[:, 0]], xy[edges[:, 1]]
-    sides = [turn(xy[a], xy[b], c), turn(xy[a], xy[b], d), turn(c, d, xy[a]), turn(c, d, xy[b])]
-    one, two, three, four = np.sign(sides)
-    return np.flatnonzero((one * two < 0) & (three * four < 0))
-
-
-def number_ends(segments: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:
-    """Number the segments' end points, nearer ones than `reach` as one: xy (n, 2), ends (m, 2)."""
-    xy, numbers = segments[:1, :2], []
-    for place in segments.reshape(-1, 2):
-        gaps = ((xy - place) ** 2).sum(axis=1)
-        numbers.append(int(gaps.argmin()))
-        if gaps.min() >= reach * reach:
-            numbers[-1], xy = len(xy), np.vstack([xy, place])
-    return xy, np.array(numbers, np.int64).reshape(-1, 2)
+@compiled
+def number_ends(places, xy, numbers, reach):
+    """Number `places` (m, 2), those closer than `reach` as one; `xy` gets vertices, their count."""
+    count = 0
+    for k in range(len(places)):
+        number, nearest = count, reach * reach
+        for v in range(count):
+            x, y = places[k, 0] - xy[v, 0], places[k, 1] - xy[v, 1]
+            if float(x * x + y * y) < nearest:
+                number, nearest = v, float(x * x + y * y)
+        if number == count:
+            copy_row(xy[count], places[k])
+            count += 1
+        numbers[k] = number
+    return count
 
 
 def node(segments: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:
@@ -78,39 +97,68 @@ def node(segments: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:
     edges if it does not come to rest (never seen; the bound keeps a broken input from hanging a
     run).
     """
-    xy, ends = number_ends(segments, reach)
-    edges, waiting = np.empty((0, 2), np.int64), ends[::-1].tolist()  # the first is the last
-    for _ in range(100 * len(segments) + 10000):
-        if not waiting:
-            return xy, edges
-        a, b = waiting.pop()
-        if a != b:
-            xy, edges = add_segment(xy, edges, a, b, reach, waiting)
-    return xy[:0], edges[:0]
+    steps = 100 * len(segments) + 10000
+    xy, edges, waiting = (np.empty((k * steps, 2), np.int64) for k in (1, 1, 4))
+    ends = np.empty(2 * len(segments), np.int64)
+    count = number_ends(segments.reshape(-1, 2), xy, ends, reach)
+    waiting[: len(segments)] = ends.reshape(-1, 2)[::-1]  # the first is the last
+    count, edge_count = add_segments(xy, count, edges, waiting, len(segments), reach)
+    edges = edges[:edge_count]
+    return xy[:count], edges[edges[:, 0] >= 0]
 
 
-def add_segment(
-    xy: np.ndarray, edges: np.ndarray, a: int, b: int, reach: float, waiting: list[list[int]]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return vertices and edges with segment ab, or put what replaces it last in `waiting`."""
-    beside = find_vertices_beside(xy, a, b, reach)
-    if len(beside):
-        v = int(beside[((xy[beside] - xy[a]) @ (xy[b] - xy[a])).argmin()])
-        waiting += [[v, b], [a, v]]
-        return xy, edges
-    if ((edges == (a, b)) | (edges == (b, a))).all(axis=1).any():
-        return xy, edges
-    crossed = find_crossings(xy, edges, a, b)[:1]
-    if not len(crossed):
-        return xy, np.vstack([edges, (a, b)])
-    c, d = xy[edges[crossed[0]]]
-    left, right = float(turn(c, d, xy[a])), float(turn(c, d, xy[b]))
-    place = np.rint(xy[a] + left / (left - right) * (xy[b] - xy[a])).astype(np.int64)
-    # the crossed edge and those beside the new vertex go through it
-    is_back = is_beside(place, xy[edges[:, 0]], xy[edges[:, 1]], reach)
-    is_back[crossed] = True
-    waiting += [[a, b], *edges[is_back].tolist()]
-    return np.vstack([xy, place]), edges[~is_back]
+@compiled
+def add_segments(xy, count, edges, waiting, top, reach):
+    """Add to `edges` the segments that are `waiting`, the last of the first `top` first.
+
+    `xy` has `count` vertices. Returns the numbers of vertices and of edges, of which some are -1.
+    """
+    edge_count = 0
+    for _ in range(len(edges)):
+        if top == 0:
+            return count, edge_count
+        top -= 1
+        a, b = waiting[top, 0], waiting[top, 1]
+        v, e = find_vertex_beside(xy[:count], a, b, reach), -1
+        for k in range(edge_count):
+            c, d = edges[k, 0], edges[k, 1]
+            if (c == a and d == b) or (c == b and d == a):
+                a = b
+            elif e < 0 <= c and crosses(xy[a], xy[b], xy[c], xy[d]):
+                e = k if crosses(xy[c], xy[d], xy[a], xy[b]) else e
+        if a == b:
+            continue
+        if v >= 0:
+            waiting[top, 0], waiting[top, 1], waiting[top + 1, 0], waiting[top + 1, 1] = v, b, a, v
+            top += 2
+        elif e < 0:
+            edges[edge_count, 0], edges[edge_count, 1] = a, b
+            edge_count += 1
+        else:
+            waiting[top, 0], waiting[top, 1] = a, b
+            top = take_back(xy, count, edges[:edge_count], e, waiting, top + 1, reach)
+            count += 1
+    return 0, 0
+
+
+@compiled
+def take_back(xy, vertex, edges, crossed, waiting, top, reach):
+    """Put a new vertex where the last waiting segment crosses an edge, and edges to go through it.
+
+    These are the `crossed` edge and those beside the vertex. Returns the new top of `waiting`.
+    """
+    a, b = xy[waiting[top - 1, 0]], xy[waiting[top - 1, 1]]
+    c, d = xy[edges[crossed, 0]], xy[edges[crossed, 1]]
+    t = float(turn(c, d, a)) / (float(turn(c, d, a)) - float(turn(c, d, b)))
+    for axis in range(2):
+        xy[vertex, axis] = np.rint(a[axis] + t * (b[axis] - a[axis]))
+    for k in range(len(edges)):
+        c = edges[k, 0]
+        if c >= 0 and (k == crossed or is_beside(xy[vertex], xy[c], xy[edges[k, 1]], reach)):
+            copy_row(waiting[top], edges[k])
+            edges[k, 0] = -1
+            top += 1
+    return top
 
 
 def heights(planes: np.ndarray, x: Any, y: Any) -> Any:
@@ -227,57 +275,84 @@ def drop_straight_vertices(xy: np.ndarray, edges: np.ndarray) -> np.ndarray:
     return np.array(ends, np.int64).reshape(-1, 2)
 
 
-def inside_intervals(soup: np.ndarray, line: np.ndarray) -> np.ndarray:
-    """Return sorted places, an even number, at which a `line` meets a polygon of edges (m, 4).
+@compiled
+def inside_intervals(soup, lower, upper, px, py, dx, dy):
+    """Return sorted parameters t, an even number, where (px, py) + t (dx, dy) meets a polygon."""
+    cuts = np.empty(upper - lower)
+    count = 0
+    for e in range(lower, upper):
+        side_a = dx * (soup[e, 1] - py) - dy * (soup[e, 0] - px)
+        side_b = dx * (soup[e, 3] - py) - dy * (soup[e, 2] - px)
+        if (side_a > 0) != (side_b > 0):
+            s = side_a / (side_a - side_b)
+            x = soup[e, 0] + s * (soup[e, 2] - soup[e, 0])
+            y = soup[e, 1] + s * (soup[e, 3] - soup[e, 1])
+            cuts[count] = dx * (x - px) + dy * (y - py)
+            count += 1
+    return sort_values(cuts[:count])
 
-    A line has x, y, and its direction; places on it are distances from there.
+
+@compiled
+def clip_to_lowest(planes, lower, upper, j, px, py, dx, dy, t_low, t_high):
+    """Narrow [t_low, t_high] to where plane j is the lowest of planes[lower:upper] on the line."""
+    for k in range(lower, upper):
+        if k == j:
+            continue
+        a, b, c = planes[k] - planes[j]
+        rise, base = a * dx + b * dy, a * px + b * py + c
+        if abs(rise) < 1e-12:
+            if base < -1e-3:
+                return 1.0, 0.0
+        elif rise > 0:
+            t_low = max(t_low, -base / rise)
+        else:
+            t_high = min(t_high, -base / rise)
+    return t_low, t_high
+
+
+@compiled
+def meeting_lines(soup, soup_start, planes, plane_start):
+    """Return the segments (m, 4) in plan along which the active plane changes.
+
+    Piece p has the edges soup_start[p]:soup_start[p + 1] of `soup`, and so its planes.
     """
-    (x0, y0, x1, y1), (px, py, dx, dy) = soup.T, line
-    side_a, side_b = dx * (y0 - py) - dy * (x0 - px), dx * (y1 - py) - dy * (x1 - px)
-    crosses = (side_a > 0) != (side_b > 0)
-    x0, y0, x1, y1, side_a, side_b = np.array([x0, y0, x1, y1, side_a, side_b])[:, crosses]
-    s = side_a / (side_a - side_b)
-    return np.sort(dx * (x0 + s * (x1 - x0) - px) + dy * (y0 + s * (y1 - y0) - py))
-
-
-def find_lowest(planes: np.ndarray, own: np.ndarray, lines: np.ndarray) -> np.ndarray:
-    """Return from where to where (2, n) on lines (n, 4) planes `own` (n or 1, 3) are the lowest.
-
-    None of `planes` (k, 3) is lower there.
-    """
-    a, b, c = np.moveaxis(planes - own[:, None], -1, 0)
-    px, py, dx, dy = lines.T[:, :, None]
-    rise, base = a * dx + b * dy, a * px + b * py + c
-    is_level = np.abs(rise) < 1e-12
-    with np.errstate(divide="ignore", invalid="ignore"):
-        t = -base / rise
-    t_low = np.where(~is_level & (rise > 0), t, -1e9).max(axis=1)
-    t_high = np.where(~is_level & (rise < 0), t, 1e9).min(axis=1)
-    return np.array([t_low, np.where((is_level & (base < -1e-3)).any(axis=1), t_low, t_high)])
-
-
-def meeting_lines(soups: Sequence[np.ndarray], groups: Sequence[np.ndarray]) -> np.ndarray:
-    """Return the segments (m, 4) in plan along which the active plane of pieces changes.
-
-    Pieces have edges, `soups`, and `groups` of planes.
-    """
-    result = [np.empty((0, 4))]
-    low, high = (np.array([f(soup[:, :2], axis=0) for soup in soups]) for f in (np.min, np.max))
-    meets = ((low[:, None] <= high) & (low <= high[:, None])).all(axis=2)
-    for p, q in np.argwhere(np.triu(meets)).tolist():
-        for i, own in enumerate(groups[p]):
-            others = groups[q][i + 1 if p == q else 0 :]
-            others = others[np.hypot(*(own - others)[:, :2].T) >= 1e-7]
-            a, b, c = (own - others).T
-            steep = np.hypot(a, b)
-            lines = np.column_stack([-c * a / steep**2, -c * b / steep**2, -b / steep, a / steep])
-            ends = find_lowest(groups[p], own[None], lines), find_lowest(groups[q], others, lines)
-            lower, upper = np.maximum(ends[0][0], ends[1][0]), np.minimum(ends[0][1], ends[1][1])
-            for k in np.flatnonzero(upper - lower >= 1):
-                inside = [inside_intervals(soup, lines[k]) for soup in (soups[p], soups[q])]
-                start = np.maximum(lower[k], np.maximum.outer(*(cuts[::2] for cuts in inside)))
-                end = np.minimum(upper[k], np.minimum.outer(*(cuts[1::2] for cuts in inside)))
-                t = np.array([start, end])[:, end - start >= 1]
-                xy = lines[k, :2] + t[:, :, None] * lines[k, 2:]
-                result.append(np.rint(np.hstack(xy)))
-    return np.concatenate(result)
+    out, count = np.empty((64, 4), np.int64), 0
+    pieces = len(plane_start) - 1
+    for p in range(pieces):
+        for q in range(p, pieces):
+            for i in range(plane_start[p], plane_start[p + 1]):
+                for j in range(i + 1 if p == q else plane_start[q], plane_start[q + 1]):
+                    a, b, c = planes[i] - planes[j]
+                    steep = np.hypot(a, b)
+                    if steep < 1e-7:
+                        continue
+                    px, py, dx, dy = -c * a / steep**2, -c * b / steep**2, -b / steep, a / steep
+                    lower, upper = clip_to_lowest(
+                        planes, plane_start[p], plane_start[p + 1], i, px, py, dx, dy, -1e9, 1e9
+                    )
+                    lower, upper = clip_to_lowest(
+                        planes, plane_start[q], plane_start[q + 1], j, px, py, dx, dy, lower, upper
+                    )
+                    if upper - lower < 1:
+                        continue
+                    in_p = inside_intervals(soup, soup_start[p], soup_start[p + 1], px, py, dx, dy)
+                    in_q = inside_intervals(soup, soup_start[q], soup_start[q + 1], px, py, dx, dy)
+                    for k in range(0, len(in_p) - 1, 2):
+                        for m in range(0, len(in_q) - 1, 2):
+                            t0 = max(lower, in_p[k], in_q[m])
+                            t1 = min(upper, in_p[k + 1], in_q[m + 1])
+                            if t1 - t0 < 1:
+                                continue
+                            if count == len(out):
+                                out, full = np.empty((2 * count, 4), np.int64), out
+                                copy_rows(out, full)
+                            out[count, 0], out[count, 1] = (
+                                np.rint(px + t0 * dx),
+                                np.rint(py + t0 * dy),
+                            )
+                            out[count, 2], out[count, 3] = (
+                                np.rint(px + t1 * dx),
+                                np.rint(py + t1 * dy),
+                            )
+                            count += 1
+    return out[:count].copy()

@@ -269,8 +269,10 @@ def arrange(
 def find_cells(problem: PlanProblem, reach: float, min_area: float, min_width: float) -> PlanCells:
     """Return the cells of one active plane, small ones merged; some may remain UNCOVERED."""
     borders, planes, _ = zip(*problem.pieces, strict=True)
-    patches = [patch for patch, _ in problem.patches]
-    soups = [problem.outline, *borders, *patches, meeting_lines(borders, planes)]
+    start, plane_start = (np.cumsum([0, *map(len, items)]) for items in (borders, planes))
+    soup = np.concatenate(borders).astype(float)
+    lines = meeting_lines(soup, start, problem.planes, plane_start)
+    soups = [problem.outline, soup, *(patch for patch, _ in problem.patches), lines]
     xy, edges = node(np.concatenate(soups).astype(np.int64), reach)
     traced = trace_faces(xy, edges)
     label, patched = label_faces(traced.polygons, problem)

@@ -100,7 +100,8 @@ def place_measure(name: str, p: dict[str, float], highest: np.ndarray) -> Measur
     (x0, y0, _), (x1, y1, _) = highest.min(axis=0), highest.max(axis=0)
     names = {"u": u, "v": v, "x0": x0, "y0": y0, "x1": x1, "y1": y1}
     names |= {"aside": ASIDE, "wall": DRAWN_WALL, "neck": NECK}
-    return Measure(name, *np.array(evaluate(ends, {**p, **names}), float))
+    sizes = dict.fromkeys(PARAMETER_ROWS, 0.0) | p
+    return Measure(name, *np.array(evaluate(ends, {**sizes, **names}), float))
 
 
 def primitive_svg(kind: str) -> str:
