@@ -11,7 +11,7 @@ from ..errors import CompositionError
 from ..frames import LocalFrame, turn_points
 from ..model import ROOF, Installation, Part, Piece, Roof, Solid
 from .arrangement import GRID_M
-from .lids import Lid, close_lids, draw_base, list_rings
+from .lids import Lid, close_lids, draw_base, list_rings, to_grid
 from .settle import PLAN_DIGITS
 from .solid import compose
 
@@ -27,7 +27,7 @@ def block(outline: shapely.Polygon, z_low: float, z_high: float) -> Solid:
     ((), 420.0)
     """
     low, high = (round(z / GRID_M) for z in (z_low, z_high))
-    plan = list_rings(shapely.transform(outline, lambda xy: xy / GRID_M))
+    plan = list_rings(to_grid(outline))
     roof = Lid([[(*place, high) for place in ring] for ring in plan], ROOF, 0)
     return close_lids([roof, draw_base([roof], low)])
 

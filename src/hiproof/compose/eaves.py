@@ -18,7 +18,8 @@ from ..model.overhang import ROOF_EDGE, WALLS
 from ..settings import ComposeSettings, Settings
 from .arrangement import GRID_M
 from .check import Finding, check_solid
-from .overhang import hang_over, to_grid
+from .lids import to_grid
+from .overhang import hang_over
 from .settle import PLAN_DIGITS
 from .solid import compose
 from .underside import list_caps

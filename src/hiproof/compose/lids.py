@@ -116,6 +116,11 @@ def join_straight_edges(base: Lid) -> Lid:
     return base._replace(rings=rings)
 
 
+def to_grid(area: shapely.Geometry) -> shapely.Geometry:
+    """Return an area in units of the grid."""
+    return shapely.transform(area, lambda xy: np.rint(xy / GRID_M))
+
+
 def list_rings(polygon: shapely.Polygon) -> list[list[Place]]:
     """Return the rings of a polygon on the grid, its area on their left."""
     polygon = shapely.orient_polygons(polygon)

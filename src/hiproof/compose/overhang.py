@@ -29,6 +29,7 @@ from .lids import (
     list_open_edges,
     list_places,
     list_rings,
+    to_grid,
 )
 from .underside import (
     SAME_PLACE_UNITS,
@@ -140,11 +141,6 @@ def draw_slabs(
             heights[place] = nearest if abs(nearest - z) <= SAME_HEIGHT_UNITS else z
             known.add(heights[place])
         yield Lid([[(*place, heights[place]) for place in ring[::-1]] for ring in rings], CEILING)
-
-
-def to_grid(area: shapely.Geometry) -> shapely.Geometry:
-    """Return an area in units of the grid."""
-    return shapely.transform(area, lambda xy: np.rint(xy / GRID_M))
 
 
 def find_slivers(cells: np.ndarray, walls: shapely.Geometry) -> np.ndarray:

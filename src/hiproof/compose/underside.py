@@ -37,6 +37,7 @@ from .lids import (
     list_lids,
     list_places,
     list_rings,
+    to_grid,
 )
 from .settle import PLAN_DIGITS
 
@@ -227,8 +228,7 @@ def cut_cells(area: shapely.Polygon, passages: Iterable[Passage]) -> list[Ground
     cells: list[GroundCell] = []
     rest: shapely.Geometry = area
     for passage in passages:
-        outline = shapely.transform(passage.outline, lambda xy: np.rint(xy / GRID_M))
-        outline = snap_corners(outline, shapely.boundary(area), SNAP_UNITS)
+        outline = snap_corners(to_grid(passage.outline), shapely.boundary(area), SNAP_UNITS)
         covered = intersect(outline, rest, 1.0)
         remainder = subtract(rest, covered, 1.0)
         slivers = [

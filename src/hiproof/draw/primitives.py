@@ -109,21 +109,16 @@ def primitive_svg(kind: str) -> str:
     building = make_typical_building(kind)
     colours = list_colours(building)
     centre, _ = bound_sphere(building.solid)
-    lines = measures(kind)
-    page = {
-        id(m): [
-            FIGURE_SCALE
-            * project_points((point - centre)[None], FIGURE_TURN_DEG, FIGURE_TILT_DEG)[0, :2]
-            for point in (m.start, m.end)
-            if point is not None
-        ]
-        for m in lines
-    }
-    corners = (
-        FIGURE_SCALE
-        * project_points(building.solid.vertices - centre, FIGURE_TURN_DEG, FIGURE_TILT_DEG)[:, :2]
-    )
-    spots = np.array([*corners, *(point for points in page.values() for point in points)])
+
+    def place(points: np.ndarray) -> np.ndarray:
+        turned = project_points(points - centre, FIGURE_TURN_DEG, FIGURE_TILT_DEG)
+        return FIGURE_SCALE * turned[:, :2]
+
+    lines = [
+        (m, place(np.array([end for end in (m.start, m.end) if end is not None])))
+        for m in measures(kind)
+    ]
+    spots = np.concatenate([place(building.solid.vertices), *(page for _, page in lines)])
     (x0, y0), (x1, y1) = spots.min(axis=0) - FIGURE_MARGIN, spots.max(axis=0) + FIGURE_MARGIN
     text = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="{x0:.0f} {y0:.0f} {x1 - x0:.0f} '
@@ -135,7 +130,7 @@ def primitive_svg(kind: str) -> str:
             face_path(face)
             for face in select_seen_faces(building.solid, colours, FIGURE_TURN_DEG, FIGURE_TILT_DEG)
         ),
-        *(draw_measure(m, page[id(m)]) for m in lines),
+        *(draw_measure(*line) for line in lines),
         "</svg>",
     ]
     return "\n".join(text) + "\n"
@@ -150,7 +145,7 @@ def face_path(face: SeenFace) -> str:
     )
 
 
-def draw_measure(measure: Measure, page: list[np.ndarray]) -> str:
+def draw_measure(measure: Measure, page: np.ndarray) -> str:
     """Draw a line with its name beside it, or the name alone of what has no length."""
     if len(page) < 2 or measure.length < 1e-9:
         x, y = page[0]

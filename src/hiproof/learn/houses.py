@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import shapely
 
+from ..frames import turn_points
 from ..model import Part
 from ..primitives.catalogue import ROUND
 from ..simulate.roofs import SimBuilding, assemble, make_part, random_building, random_parameters
@@ -121,15 +122,11 @@ def annex(rng: np.random.Generator, main: Part) -> Part:
     )
     along, perpendicular = reach + (depth - inside) / 2, rng.uniform(-0.5, 0.5) * (side - across)
     angle = main.kappa + quarters * math.pi / 2
-    x = math.cos(angle) * along - math.sin(angle) * perpendicular
-    y = math.sin(angle) * along + math.cos(angle) * perpendicular
+    xy = main.translation[:2] + turn_points(np.array([along, perpendicular]), angle)
     turn = math.pi / 2 if type == "monopitch" else 0.0
     if turn:
         parameters["length"], parameters["width"] = parameters["width"], parameters["length"]
-    translation = np.array(
-        [main.translation[0] + x, main.translation[1] + y, max(eave, LOWEST_EAVE_M)]
-    )
-    return make_part(type, parameters, angle + turn, translation)
+    return make_part(type, parameters, angle + turn, np.append(xy, max(eave, LOWEST_EAVE_M)))
 
 
 def annex_parameters(

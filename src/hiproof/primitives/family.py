@@ -277,18 +277,8 @@ class Member:
         local_planes = self.compute_local_planes()
         for shape in get(self.name).variants:
             theta = self.theta(shape)
-            planes = [
-                plane
-                for _, plane in sorted(
-                    zip(shape.sides, shape.plane_values(theta).tolist(), strict=True)
-                )
-            ]
-            gap = (
-                abs(x - y)
-                for item, other in zip(planes, local_planes, strict=True)
-                for x, y in zip(item, other, strict=True)
-            )
-            if max(gap) < SAME * 10.0 and shape.is_proper(theta):
+            gaps = np.abs(shape.plane_values(theta)[np.argsort(shape.sides)] - local_planes)
+            if gaps.max() < SAME * 10.0 and shape.is_proper(theta):
                 return shape, shape.canonical_theta(theta)
         return None
 
