@@ -32,16 +32,14 @@ def split_at_crossings(
     gap = left - right
     crosses = (gap[:, 0] * gap[:, 1] < 0) & (np.abs(gap) > LEVEL_GAP_UNITS).all(axis=1)
     places, split, ties = [xy], edges.copy(), []
-    crossed = np.flatnonzero(crosses & (side != OUTSIDE).all(axis=1))
-    for e in crossed.tolist():
-        (at_a, at_b), (a, b) = gap[e].tolist(), xy[edges[e]].tolist()
-        t, length = at_a / (at_a - at_b), math.dist(a, b)
-        if min(t, 1 - t) * length < reach:
-            end = 0 if t < 0.5 else 1
+    for e in np.flatnonzero(crosses & (side != OUTSIDE).all(axis=1)).tolist():
+        (a, b), t = xy[edges[e]], gap[e, 0] / (gap[e, 0] - gap[e, 1])
+        room, end = min(t, 1 - t) * math.dist(a, b), int(t >= 0.5)
+        if room < reach:
             ties.append((edges[e, end], *sorted((left[e, end], right[e, end]))))
             continue
-        place = (a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]))
-        if min(t, 1 - t) * length < NEAR_UNITS:
+        place = a + t * (b - a)
+        if room < NEAR_UNITS:
             place = move_crossing(cells, planes[side[e]], e, place, reach)
         split[e, 1] = len(xy) + len(places) - 1
         places.append(np.rint([place]).astype(np.int64))
@@ -52,8 +50,8 @@ def split_at_crossings(
 
 
 def move_crossing(
-    cells: PlanCells, planes: np.ndarray, e: int, place: tuple[float, float], reach: float
-) -> tuple[float, float]:
+    cells: PlanCells, planes: np.ndarray, e: int, place: np.ndarray, reach: float
+) -> np.ndarray:
     """Return the grid point for a crossing of the two `planes` (2, 3) beside edge e.
 
     The crossing is at `place`; the point lies a millimetre aside where there is room. On the edge
@@ -77,7 +75,7 @@ def move_crossing(
     lines = shapely.multilinestrings(shapely.linestrings(others))
     for k in np.argsort(off, kind="stable"):
         if shapely.distance(lines, shapely.Point(x[k], y[k])) >= reach:
-            return x[k], y[k]
+            return np.array([x[k], y[k]])
     return place
 
 

@@ -187,16 +187,22 @@ class Cadastre:
         self, number: int, solid: Solid, party: Collection[int] = ()
     ) -> tuple[dict[str, Any], Surfaces]:
         """Return attributes of a building and of faces of its `solid`; `party` are party walls."""
-        attributes, surfaces = self.describe_roofs(number, solid)
+        size, normals = measure_faces(solid)
+        attributes, surfaces = self.describe_roofs(number, solid, size, normals)
         attributes[f"{OWN}sun_sky"] = name_sky(self.settings.weather)
         if self.settings.sun_on_walls:
-            sums, walls = self.describe_walls(number, solid, party)
-            attributes, surfaces = attributes | sums, surfaces | walls
+            walls = [wall for wall in find_walls(solid) if wall.face not in party]
+            places = {wall.face: sample_wall(wall, normals[wall.face]) for wall in walls}
+            suns = self.irradiate_faces(number, places, normals)
+            total = sum(float(size[face] * sun.by_month.sum()) for face, sun in suns.items())
+            attributes |= round_values({"wall_sun_kwh": total}, 1)
+            surfaces |= {face: round_values(name_values(sun), 3) for face, sun in suns.items()}
         return attributes, surfaces
 
-    def describe_roofs(self, number: int, solid: Solid) -> tuple[dict[str, Any], Surfaces]:
+    def describe_roofs(
+        self, number: int, solid: Solid, size: np.ndarray, normals: np.ndarray
+    ) -> tuple[dict[str, Any], Surfaces]:
         """Return attributes of building `number`, and of its roof faces."""
-        size, normals = measure_faces(solid)
         faces = [
             face
             for face, item in enumerate(solid.faces)
@@ -216,18 +222,6 @@ class Cadastre:
             )
         names = ("roof_sun_kwh", "pv_area_m2", "pv_kwh")
         return round_values(dict(zip(names, totals.tolist(), strict=True)), 1), surfaces
-
-    def describe_walls(
-        self, number: int, solid: Solid, party: Collection[int]
-    ) -> tuple[dict[str, Any], Surfaces]:
-        """Return attributes of building `number`, and of its outer walls."""
-        size, normals = measure_faces(solid)
-        walls = [wall for wall in find_walls(solid) if wall.face not in party]
-        places = {wall.face: sample_wall(wall, normals[wall.face]) for wall in walls}
-        suns = self.irradiate_faces(number, places, normals)
-        total = sum(size[face] * sun.by_month.sum() for face, sun in suns.items())
-        surfaces = {face: round_values(name_values(sun), 3) for face, sun in suns.items()}
-        return round_values({"wall_sun_kwh": float(total)}, 1), surfaces
 
     def irradiate_faces(
         self, number: int, places: dict[int, np.ndarray], normals: np.ndarray
