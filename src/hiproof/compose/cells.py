@@ -236,19 +236,15 @@ SAME_PLANES = 1e-6  # m, and of slope; planes that differ by less are one
 def equal_planes(planes: np.ndarray) -> np.ndarray:
     """Return the index (p,) of the first plane that equals each.
 
-    Planes (p, 3) are equal within SAME_PLANES of metres and of slope. Sorted by height, few are
-    compared. Parts that share a plane share its faces: where they touch, one face carries the first
-    part's index.
+    Planes (p, 3) are equal within SAME_PLANES of metres and of slope. Parts of one plane share
+    faces: where they touch, one face carries the first part's index.
     """
-    order = np.argsort(planes[:, 2], kind="stable")
-    in_order, first = planes[order], np.arange(len(planes))
-    for step in range(1, len(planes)):
-        differences = np.abs(in_order[step:] - in_order[:-step])
-        if differences[:, 2].min() >= SAME_PLANES:
-            break
-        is_equal = differences.max(axis=1) < SAME_PLANES
-        pairs = np.sort([order[:-step][is_equal], order[step:][is_equal]], axis=0)
-        np.minimum.at(first, pairs[1], pairs[0])
+    from scipy.spatial import cKDTree
+
+    nearer = np.nextafter(SAME_PLANES, 0.0)
+    pairs = cKDTree(planes).query_pairs(nearer, p=np.inf, output_type="ndarray")
+    first = np.arange(len(planes))
+    np.minimum.at(first, pairs[:, 1], pairs[:, 0])
     return first
 
 

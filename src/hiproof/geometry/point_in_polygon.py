@@ -27,9 +27,5 @@ def find_inside(area: shapely.Geometry, x: np.ndarray, y: np.ndarray) -> np.ndar
     >>> find_inside(shapely.box(0, 0, 2, 1), np.array([1.0, 2.0, 3.0]), np.full(3, 0.5)).tolist()
     [True, True, False]
     """
-    x0, y0, x1, y1 = area.bounds
-    near = np.flatnonzero((x >= x0) & (x <= x1) & (y >= y0) & (y <= y1))
-    inside = np.zeros(len(x), bool)
     shapely.prepare(area)
-    inside[near] = shapely.intersects_xy(area, x[near], y[near])
-    return inside
+    return np.asarray(shapely.intersects_xy(area, x, y))

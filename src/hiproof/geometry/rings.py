@@ -49,9 +49,6 @@ def counterclockwise(ring: shapely.LinearRing) -> np.ndarray:
 
 def ring_edges(area: shapely.Geometry) -> tuple[np.ndarray, np.ndarray]:
     """Return starts and ends (m, 2) of all edges of one or several polygons."""
-    if area.geom_type == "Polygon" and not area.interiors:
-        ring = shapely.get_coordinates(area)
-        return ring[:-1], ring[1:]
     rings = shapely.get_rings(shapely.get_parts(area))
     xy, ring_number = shapely.get_coordinates(rings, return_index=True)
     follows = ring_number[1:] == ring_number[:-1]

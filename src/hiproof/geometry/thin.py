@@ -45,11 +45,7 @@ def without_repeats(xyz: np.ndarray) -> np.ndarray:
     >>> len(without_repeats(np.array([[0.2, 0.2, 1.0], [0.4, 0.6, 3.0], [0.2, 0.2, 1.0]])))
     2
     """
-    mixed = hashes(xyz)
-    ascending = np.sort(mixed)
-    if not (ascending[1:] == ascending[:-1]).any():
-        return xyz
-    return xyz[np.sort(np.unique(mixed, return_index=True)[1])]
+    return xyz[np.sort(np.unique(hashes(xyz), return_index=True)[1])]
 
 
 def hashes(xyz: np.ndarray) -> np.ndarray:
