@@ -65,8 +65,6 @@ def with_area(geometry: shapely.Geometry) -> shapely.Geometry:
     >>> shapely.intersection(one, other).geom_type, with_area(shapely.intersection(one, other)).area
     ('GeometryCollection', 1.0)
     """
-    if geometry.geom_type == "Polygon" and not geometry.is_empty:
-        return geometry
     polygons = [part for part in shapely.get_parts(geometry) if part.geom_type == "Polygon"]
     return polygons[0] if len(polygons) == 1 else shapely.MultiPolygon(polygons)
 

@@ -22,33 +22,22 @@ SYMBOLS = ("V", "U", "q0", "q1", "q2", "q3")
 class Formula:
     """A sum of monomials: `terms` maps exponents of SYMBOLS to the factor.
 
-    >>> (2 * V - q1 * V / q2)(V=3.0, U=0.0, q0=0.0, q1=1.0, q2=2.0, q3=0.0)
+    >>> (2 * V - q1 * V / q2).at((3.0, 0.0, 0.0, 1.0, 2.0, 0.0))
     4.5
     """
 
     terms: tuple[tuple[float, tuple[int, ...]], ...]
 
-    def __call__(self, V: float, U: float, q0: float, q1: float, q2: float, q3: float) -> float:
-        """Return the value at the six shape parameters."""
-        return self.at((V, U, q0, q1, q2, q3))
-
     def at(self, shape: Sequence[Any] | np.ndarray) -> Any:
         """Return the value at V, U, q0, q1, q2, q3: (6,), or arrays (m,) of these."""
         total: Any = 0.0
-        for factor, powers in self.sparse:
+        for factor, powers in self.terms:
             value: Any = factor
-            for k, power in powers:
-                value = value * (shape[k] if power == 1 else shape[k] ** power)
+            for size, power in zip(shape, powers, strict=True):
+                if power:
+                    value = value * (size if power == 1 else size**power)
             total = total + value
         return total
-
-    @cached_property
-    def sparse(self) -> tuple[tuple[float, tuple[tuple[int, int], ...]], ...]:
-        """The terms with only the exponents that are not zero."""
-        return tuple(
-            (f, tuple((k, power) for k, power in enumerate(powers) if power))
-            for f, powers in self.terms
-        )
 
     def gradient(self, shape: Sequence[float] | np.ndarray) -> np.ndarray:
         """Return the derivatives (6,) with respect to SYMBOLS at `shape` (6,)."""

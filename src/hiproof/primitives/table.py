@@ -1,4 +1,7 @@
-"""Make roof shapes of the rows of data/shapes.toml, which explains its columns; measures.toml."""
+"""Make roof shapes of the rows of data/shapes.toml, which explains its columns.
+
+Rows of data/measures.toml say more of their parameters.
+"""
 
 from __future__ import annotations
 
