@@ -115,6 +115,14 @@ def test_a_layer_of_passages_is_below_the_houses_it_meets(town_with_gates, tmp_p
     ] == passages
 
 
+def test_a_layer_below_no_house_is_named(town_with_gates, tmp_path):
+    request, _ = town_with_gates
+    beside = shapely.box(*(ORIGIN[:2] - 50), *(ORIGIN[:2] - 45))
+    layer = str(write_layer(tmp_path / "beside.geojson", [beside], {"height": [3.0]}))
+    with pytest.warns(InputWarning, match="expected underpasses below the footprints, got none"):
+        make_plan(replace(request, underpasses=layer))
+
+
 def test_what_is_wrong_with_a_layer_is_one_sentence(town_with_gates):
     request, layer = town_with_gates
     with pytest.raises(InputError, match="expected a column clearance of the underpasses in"):

@@ -43,9 +43,16 @@ def add_passages(
         return footprints
     layer = read_passages(request, frame)
     tree = shapely.STRtree([polygon for polygon, _ in layer])
+    below = [select_below(footprint, layer, tree) for footprint in footprints]
+    if layer and not any(below):
+        warnings.warn(
+            f"expected underpasses below the footprints, got none of {request.underpasses} there; "
+            "check its place and its CRS",
+            InputWarning,
+        )
     return tuple(
-        replace(footprint, passages=(*footprint.passages, *select_below(footprint, layer, tree)))
-        for footprint in footprints
+        replace(footprint, passages=(*footprint.passages, *passages))
+        for footprint, passages in zip(footprints, below, strict=True)
     )
 
 
