@@ -17,7 +17,7 @@ from hiproof.status import Status
 from hiproof.update.solve import update_tile
 
 DEADLY = "house-2"
-PRELOADED = ["planted", "hiproof.fit.union", "distributed"]  # by the process that forks workers
+PRELOADED = ["planted", "hiproof.fit.roof", "distributed"]  # by the process that forks workers
 
 
 def count_points(points, footprint, terrain, settings, id, ground=None, unused=None, neighbours=()):

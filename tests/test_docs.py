@@ -137,7 +137,7 @@ def test_the_sites_generated_pages_tell_every_command_option_and_setting():
     [
         ("hiproof", "'torch', 'dask', 'numba', 'scipy', 'onnxruntime'"),
         (
-            "hiproof.city.run, hiproof.city.work.solve, hiproof.fit.union",
+            "hiproof.city.run, hiproof.city.work.solve, hiproof.fit.roof",
             "'dask', 'scipy.ndimage', 'scipy.optimize', 'scipy.sparse', 'scipy.spatial', "
             "'scipy.special', 'onnxruntime', 'rasterio', 'xml.etree'",
         ),

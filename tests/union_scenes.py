@@ -6,9 +6,7 @@ from dataclasses import replace
 import numpy as np
 import shapely
 
-from hiproof.fit.union.plan import lay_out_plan
-from hiproof.fit.union.scene import open_window
-from hiproof.fit.union.volumes import (
+from hiproof.fit.candidates.volumes import (
     COLUMNS,
     DIRECTION,
     LEAN0,
@@ -24,9 +22,10 @@ from hiproof.fit.union.volumes import (
     V0,
     V1,
     equalise_slopes,
-    make_base,
 )
-from hiproof.fit.union.whole import lay_out_whole
+from hiproof.fit.layout.plan import lay_out_plan
+from hiproof.fit.layout.scene import open_window
+from hiproof.fit.layout.whole import lay_out_whole
 from hiproof.primitives.family import GENERAL_SHAPES, Member
 from hiproof.settings import Settings
 
@@ -60,9 +59,11 @@ def draw_volume(rng, replacing=0.2):
 
 def draw_volumes(rng, most_volumes=5, replacing=0.2):
     """Draw a level base and random volumes: rows (k, COLUMNS)."""
+    base = np.r_[np.zeros(OFFSET0), [np.inf] * LEVEL, -1.0, np.zeros(COLUMNS - OFFSET0 - N_PLANES)]
+    base[U0 : V1 + 1] = -1e4, 1e4, -1e4, 1e4
     return np.vstack(
         [
-            make_base(-1.0),
+            base,
             *[draw_volume(rng, replacing) for _ in range(rng.integers(1, most_volumes + 1))],
         ]
     )

@@ -44,7 +44,7 @@ _HOME = {
     "write_parameters": "write",
     "write_attributes": "write",
     "Building": "model",
-    "BuildingFit": "fit.union.fit",
+    "BuildingFit": "fit.outcome",
     "Face": "model",
     "Fit": "model",
     "Footprint": "model",

@@ -74,4 +74,5 @@ def test_two_thirds_of_the_errors_of_a_parameter_are_within_one_deviation(name):
             ratios[one].append(abs(ratio))
     assert len(ratios[name]) >= 10
     assert 0.5 < np.quantile(ratios[name], 0.683) < 1.5
-    assert np.mean(np.array(ratios[name]) > 3.0) <= 0.07
+    # a blunder now and then: seven in a hundred, or three of few
+    assert np.count_nonzero(np.array(ratios[name]) > 3.0) <= max(3, 0.07 * len(ratios[name]))

@@ -86,10 +86,14 @@ def test_a_pointed_roof_over_a_polygon_has_a_facet_over_each_wall():
 
 def test_a_cone_is_no_onion_of_any_width():
     """No bulge lies along a cone, so its points do not determine that of an onion."""
-    _, parts = fit_scene("cone", "tower", 105)
-    assert sorted(part.type for part in parts if part.type != "flat") == ["cone"]
-    (cone,) = [part for part in parts if part.type == "cone"]
-    assert cone.parameters["width"] == pytest.approx(7.47, rel=0.1)
+    right = 0
+    for seed in range(100, 112):
+        scene, parts = fit_scene("cone", "tower", seed)
+        true, _, _ = CATALOGUE["cone"].from_theta(scene.theta)
+        curved = [part for part in parts if part.type != "flat"]
+        if [part.type for part in curved] == ["cone"]:
+            right += curved[0].parameters["width"] == pytest.approx(true["width"], rel=0.1)
+    assert right >= 9
 
 
 @pytest.mark.parametrize(("setting", "seed"), [("alone", 10), ("tower", 10)])

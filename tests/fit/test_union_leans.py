@@ -6,17 +6,11 @@ import numpy as np
 import pytest
 import shapely
 
-from hiproof.compiled import compiled
+from hiproof.fit.layout.scene import MOST_WALL_LEAN, find_leans
 from hiproof.fit.roof import fit_building
-from hiproof.fit.union.around import measure_context
-from hiproof.fit.union.facings import face_walls, turn_plane
-from hiproof.fit.union.objective import compute_objective
-from hiproof.fit.union.scene import MOST_WALL_LEAN, find_leans
-from hiproof.fit.union.volumes import LEAN0, N_SIDES, OFFSET0, find_lowest_plane, read_coefficients
 from hiproof.model import Roof
 from points_of_roofs import scatter
 from roof_zoo import FRAME
-from union_scenes import draw_scene, draw_volumes
 
 
 def make_wedge(skew):
@@ -61,66 +55,6 @@ def test_slopes_that_face_neither_wall_nor_each_other_are_one_gable():
     assert len(fit.roof_parts) == 1
     inner = shapely.contains_xy(outline.buffer(-0.3), *xy.T)
     assert np.abs(Roof(fit.roof_parts, outline, FRAME).height_at(xy[inner]) - z[inner]).max() < 0.15
-
-
-@compiled
-def face_walls_around(volumes, scene, value, k):
-    """Call it as the search does: called from Python it would be compiled once more."""
-    return face_walls(volumes, scene, value, k, measure_context(volumes, scene.U, scene.V, k))
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_facing_walls_never_costs(seed):
-    rng = np.random.default_rng(seed)
-    volumes, scene = draw_volumes(rng), draw_scene(rng)
-
-    value = compute_objective(volumes, scene)
-    for k in range(1, len(volumes)):
-        result, lower = face_walls_around(volumes.copy(), scene, value, k)
-        assert lower <= value
-        assert compute_objective(result, scene) == pytest.approx(lower, rel=1e-9)
-        assert np.isfinite(result[:, LEAN0 : LEAN0 + N_SIDES]).all()
-
-
-# The later seeds lost planes, to a wall that was none.
-@pytest.mark.parametrize("seed", [0, 1, 2, 68, 101, 281, 314, 360, 396, 399])
-def test_facing_walls_takes_no_plane_away(seed):
-    rng = np.random.default_rng(seed)
-    volumes, scene = draw_volumes(rng), draw_scene(rng)
-    scene = scene._replace(
-        leans=np.where(np.arange(scene.leans.shape[2]) == 0, 0.1, np.full_like(scene.leans, np.inf))
-    )
-    for k in range(1, len(volumes)):
-        result, _ = face_walls(
-            volumes.copy(),
-            scene,
-            compute_objective(volumes, scene),
-            k,
-            measure_context(volumes, scene.U, scene.V, k),
-        )
-        n_kept, is_given = (
-            np.isfinite(rows[k, OFFSET0 : OFFSET0 + N_SIDES]) for rows in (result, volumes)
-        )
-        assert (n_kept == is_given).all()
-        assert np.isfinite(result[:, LEAN0 : LEAN0 + N_SIDES]).all()
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_a_turned_plane_keeps_its_height_where_it_is_turned(seed):
-    rng = np.random.default_rng(seed)
-    row = draw_volumes(rng)[-1]
-    for plane in np.nonzero(np.isfinite(row[OFFSET0 : OFFSET0 + N_SIDES]))[0]:
-        separate = row.copy()
-        separate[OFFSET0 : OFFSET0 + N_SIDES + 1] = np.inf
-        separate[OFFSET0 + plane] = row[OFFSET0 + plane]
-        middle, original = rng.uniform(-3.0, 3.0, 2), separate.copy()
-        turn_plane(separate, plane, 0.2, middle)
-        assert separate[LEAN0 + plane] == 0.2
-        heights = [
-            find_lowest_plane(read_coefficients(item[None], 0), *middle)[0]
-            for item in (original, separate)
-        ]
-        assert heights[0] == pytest.approx(heights[1], abs=1e-9)
 
 
 def test_walls_are_those_near_an_axis_but_not_along_it():

@@ -7,19 +7,14 @@ import numpy as np
 import pytest
 import shapely
 
+from hiproof.fit.candidates.volumes import COLUMNS, LEVEL, N_PLANES, OFFSET0, U0, V1
 from hiproof.fit.roof import fit_building
 from hiproof.fit.roof.site import make_site
-from hiproof.fit.roof.start import start_roof
+from hiproof.fit.roof.start import add_volume, put_on_walls
+from hiproof.fit.roof.tables import make_tables
 from hiproof.fit.shapes.curved import fit_shapes
 from hiproof.fit.shapes.regions import unite_outlines
 from hiproof.fit.shapes.teeth import unite_saw_teeth
-from hiproof.fit.union.volumes import (
-    U0,
-    U1,
-    V1,
-    compute_roof_heights,
-    make_base,
-)
 from hiproof.model import Part, Piece
 from hiproof.primitives import get
 from hiproof.primitives.family import Member
@@ -41,17 +36,17 @@ from union_scenes import lay_out_scene, list_corners
 def test_a_side_lies_on_a_wall_near_it_unless_points_lie_elsewhere(end, drawn_end, place):
     block = shapely.box(-4.0, -4.0, 4.0, 4.0)
     outline = block | shapely.box(4.0, -4.0, 7.0, 0.0) | shapely.box(-7.0, 0.0, -4.0, 4.0)
-    volumes = np.vstack([make_base(-5.0), make_base(2.0)])
-    volumes[1, U0 : V1 + 1] = -4.0, end, -4.0, 4.0
     xy = np.random.default_rng(0).uniform(-7.0, 7.0, (600, 2))
     xy = xy[shapely.contains_xy(outline, *xy.T)]
     whole, _ = lay_out_scene(np.column_stack([xy, np.zeros(len(xy))]), outline, [0.0])
-    z = compute_roof_heights(volumes, *whole.plan.uvz[:2, None])[0]
-    site = make_site(
-        replace(whole, plan=replace(whole.plan, uvz=np.vstack([whole.plan.uvz[:2], z])))
-    )
-    volumes[1, U1] = drawn_end
-    roof = start_roof(volumes, whole.turn, site)
+    u, v = whole.plan.uvz[:2]
+    z = np.where((u >= -4.0) & (u <= end) & (np.abs(v) <= 4.0), 2.0, -5.0)
+    site = make_site(replace(whole, plan=replace(whole.plan, uvz=np.vstack([u, v, z]))))
+    volume = np.r_[np.zeros(OFFSET0), [np.inf] * 4, 2.0, np.zeros(COLUMNS - OFFSET0 - N_PLANES)]
+    roof = make_tables(2, 20, 20)
+    for rectangle, height in ([-7.0, 7.0, -4.0, 4.0], -5.0), ([-4.0, drawn_end, -4.0, 4.0], 2.0):
+        volume[U0 : V1 + 1], volume[OFFSET0 + LEVEL] = rectangle, height
+        put_on_walls(roof, add_volume(roof, volume, whole.turn), site, False)
     ends = -roof.half_planes[1, :2, 2] * roof.half_planes[1, :2, 0]
     assert ends == pytest.approx([-4.0, place], abs=1e-9)
 

@@ -3,11 +3,14 @@
 import numpy as np
 import pytest
 
-from hiproof.fit.union.candidates import group_planes, turn_to_walls
-from hiproof.fit.union.plan import lay_lines, measure_depth
-from hiproof.fit.union.planes import (
+from hiproof.fit.candidates.listing import (
+    fill_gains,
+    find_best_rectangles,
+    group_planes,
+    turn_to_walls,
+)
+from hiproof.fit.candidates.planes import (
     NEIGHBOUR_RADIUS_M,
-    Cloud,
     Grid,
     bound_rows,
     fill_point_gains,
@@ -18,7 +21,16 @@ from hiproof.fit.union.planes import (
     solve_three,
     truncate_cost,
 )
-from union_scenes import search_all_rectangles
+from hiproof.fit.candidates.volumes import DIRECTION, U0, V1, price_volume
+from hiproof.fit.layout.plan import Cloud, lay_lines, measure_depth
+from hiproof.fit.misfit import compute_costs
+from union_scenes import (
+    compute_heights,
+    draw_scene,
+    draw_volume,
+    draw_volumes,
+    search_all_rectangles,
+)
 
 
 def find_rectangle(gain, least_sum):
@@ -150,3 +162,64 @@ def test_a_plane_faces_the_walls_that_it_very_nearly_faces():
     assert result[:, 1].tolist() == pytest.approx([0.0, 0.042, 0.0, 0.3])
     assert result[:, 0].tolist() == [0.7, 0.7, 0.0, 0.5]
     assert at_middle == pytest.approx((pool[:, :2] @ middle + pool[:, 2])[[0, 0, 1, 2]])
+
+
+def draw_case(seed):
+    """Return a generator, random volumes, and a scene of points near other volumes."""
+    rng = np.random.default_rng(seed)
+    volumes = draw_volumes(rng)
+    return rng, volumes, draw_scene(rng, draw_volumes(rng))
+
+
+@pytest.mark.parametrize("replacing", [False, True])
+@pytest.mark.parametrize("seed", range(6))
+def test_the_best_candidate_has_the_best_of_all_rectangles(seed, replacing):
+    rng, volumes, scene = draw_case(seed)
+    candidates = np.array([draw_volume(rng, 0.0) for _ in range(6)])
+    cell_u, cell_v = rng.integers(0, 6, (2, *scene.U.shape))
+    scene = scene._replace(lines=np.tile(np.arange(7.0), (2, 2, 1)))
+    z_now, _ = compute_heights(volumes, scene.U, scene.V)
+    cost_now = compute_costs(z_now, scene)
+    gains, cells = find_best_rectangles(
+        scene, candidates, cell_u, cell_v, cost_now, z_now, replacing
+    )
+    brute, result = np.empty(6), np.empty(6)
+    for m, (i0, i1, j0, j1) in enumerate(cells):
+        gain = np.zeros((6, 6))
+        fill_cell_gains(scene, candidates, m, (cell_u, cell_v), cost_now, z_now, replacing, gain)
+        price = scene.unit * price_volume(candidates[m])
+        brute[m], result[m] = search_all_rectangles(gain) - price, gain[i0:i1, j0:j1].sum() - price
+    assert (
+        gains.max() == pytest.approx(brute.max())
+        if brute.max() > 1e-6
+        else not np.isfinite(gains).any()
+    )
+    is_given = np.isfinite(gains)
+    assert gains[is_given] == pytest.approx(brute[is_given])
+    assert gains[is_given] == pytest.approx(result[is_given])
+    assert (brute[~is_given] <= max(0.5 * brute.max(), 1e-6) + 1e-9).all()
+
+
+def fill_cell_gains(scene, candidates, m, cells, cost_now, z_now, replacing, gain):
+    """Fill `gain` with all that candidate m gains, by cell."""
+    by_place = np.empty(len(z_now))
+    floor = np.full(len(z_now), -np.inf) if replacing else z_now + 1e-9
+    total = fill_gains(scene, candidates, m, cost_now, floor, by_place)
+    assert total == pytest.approx(by_place[by_place > 0.0].sum())
+    np.add.at(gain, tuple(cell[int(candidates[m, DIRECTION])] for cell in cells), by_place)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_what_a_candidate_gains_in_a_cell_is_the_drop_of_its_points_cost(seed):
+    rng, volumes, scene = draw_case(seed)
+    candidate = draw_volume(rng, 0.0)[None]
+    cell = np.zeros(scene.U.shape, int)
+    z_now, _ = compute_heights(volumes, scene.U, scene.V)
+    cost_now, gain = compute_costs(z_now, scene), np.zeros((1, 1))
+    fill_cell_gains(scene, candidate, 0, (cell, cell), cost_now, z_now, False, gain)
+    wide = candidate.copy()
+    wide[0, U0 : V1 + 1] = -1e3, 1e3, -1e3, 1e3
+    h = compute_heights(wide, scene.U, scene.V)[0]
+    cost = compute_costs(h, scene)
+    cost[: scene.n][cost[: scene.n] >= 1.0] += 0.02  # what covers a point without explaining it
+    assert gain[0, 0] == pytest.approx((cost_now - cost)[h > z_now + 1e-9].sum())

@@ -6,16 +6,11 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from hiproof.fit.layout.plan import Cloud, measure_emptiness
 from hiproof.fit.roof import fit_building
-from hiproof.fit.union.candidates import list_candidates
-from hiproof.fit.union.grow import prepare_growth, regrow_volumes
-from hiproof.fit.union.objective import compute_objective
-from hiproof.fit.union.plan import measure_emptiness
-from hiproof.fit.union.planes import Cloud
 from hiproof.model import Roof
 from points_of_roofs import scatter
 from roof_zoo import FRAME
-from union_scenes import draw_scene, draw_volumes
 
 L_SHAPE = shapely.Polygon([(0, 0), (14, 0), (14, 7), (7, 7), (7, 15), (0, 15)])
 U_SHAPE = shapely.Polygon([(0, 0), (20, 0), (20, 14), (14, 14), (14, 6), (6, 6), (6, 14), (0, 14)])
@@ -35,17 +30,6 @@ def test_two_hips_that_share_a_corner_are_two_hips():
     fit = fit_building(np.column_stack([xy, 5.0 + 0.7 * z]), L_SHAPE)
     assert len(fit.roof_parts) == 2
     assert {part.type for part in fit.roof_parts} <= {"hip", "side_hip"}
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_growing_anew_never_costs(seed):
-    rng = np.random.default_rng(seed)
-    volumes, scene = draw_volumes(rng, replacing=0.0), draw_scene(rng)
-    value = compute_objective(volumes, scene)
-    candidates = list_candidates(scene, np.arange(scene.n), 12)
-    result, lower = regrow_volumes(volumes, value, prepare_growth(scene, candidates), candidates)
-    assert lower <= value
-    assert compute_objective(result, scene) == pytest.approx(lower, rel=1e-9)
 
 
 def scatter_points(outline, density):

@@ -5,7 +5,7 @@ import pytest
 import shapely
 from scipy.spatial import cKDTree
 
-from hiproof.fit.union.plan import FACADE_BORDER_M, find_roof_points, measure_depth, ring_edges
+from hiproof.fit.layout.plan import FACADE_BORDER_M, find_roof_points, measure_depth, ring_edges
 from hiproof.fit.walls import STEEPEST_ROOF, WALL_REACH_SPACINGS
 from hiproof.fit.walls import on_walls as found_on_walls
 from points_of_roofs import scatter

@@ -6,10 +6,10 @@ import shapely
 
 from hiproof import reconstruct
 from hiproof.compose import check_solid
+from hiproof.fit.layout.blocks import BLOCK_M2, HeightRaster, find_cheapest_cut
+from hiproof.fit.layout.plan import lay_out_plan
+from hiproof.fit.layout.whole import lay_out_whole
 from hiproof.fit.roof import fit_building
-from hiproof.fit.union.blocks import BLOCK_M2, HeightRaster, find_cheapest_cut
-from hiproof.fit.union.plan import lay_out_plan
-from hiproof.fit.union.whole import lay_out_whole
 from hiproof.settings import Settings
 from hiproof.status import Status
 from points_of_roofs import sample_heights

@@ -3,6 +3,7 @@ with the truth.
 """
 
 import json
+import re
 
 import laspy
 import numpy as np
@@ -160,10 +161,15 @@ def test_every_type_and_the_compounds_stand_there():
     assert {"L", "T", "U", "cross", "extension", "two_level", "saw_tooth_hall"} <= kinds
 
 
+def round_numbers(text):
+    return re.sub(r"-?\d+\.\d+(e-?\d+)?", lambda number: f"{float(number[0]):.6f}", text)
+
+
 def test_bundled_files_are_what_the_command_makes(tmp_path):
     write_neighbourhood(tmp_path)
     bundled = demo_files()
-    assert (tmp_path / "truth.json").read_text() == bundled["truth"].read_text()
+    made, kept = ((tmp_path / "truth.json").read_text(), bundled["truth"].read_text())
+    assert round_numbers(made) == round_numbers(kept)  # processors differ in the last digit
     for name in ("cloud.laz", "terrain.tif"):
         size = (tmp_path / name).stat().st_size
         assert size == pytest.approx(bundled[name.split(".")[0]].stat().st_size, rel=0.02)

@@ -10,7 +10,10 @@ kernel         the likelihood with gradient and Hessian, minimised; compiled
 paper          the objective of the paper, as published
 prices         the table of prices of a roof
 roof           `fit_building`: a roof of few volumes, drawn by one price and one loop
-union          the search for these volumes
+layout         what a roof is fitted to: points, an outline, its directions, blocks of it
+candidates     volumes that points suggest
+misfit         what points and unobserved cells cost under a roof; compiled
+outcome        the outcome of `fit_building`
 shapes         larger and curved shapes in place of its parts
 outline        the outline of a building that comes without one
 align          how far a footprint lies beside its roof

@@ -20,8 +20,8 @@ import shapely
 
 from ..geometry.grid import count_cells
 from ..geometry.point_in_polygon import find_inside
+from .candidates.planes import bound_rows, find_best_rectangle
 from .direction import main_direction
-from .union.planes import bound_rows, find_best_rectangle
 
 NODE_M, MOST_NODES = 0.5, 200
 """Distance (m) between the places that are classified, and places along a side at most: the time

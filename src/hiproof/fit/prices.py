@@ -3,9 +3,7 @@
     misfit of every point and unobserved cell
     + unit * (volumes + unknowns + corners + metres of low steps)
 
-A unit is as many points as it must explain. Nothing but this table decides between two roofs. The
-search compares roofs that are not drawn: it knows no corners and steps, and prices volumes higher
-and loose edges in their place.
+A unit is as many points as it must explain. Nothing but this table decides between two roofs.
 """
 
 from __future__ import annotations
@@ -39,7 +37,7 @@ LACK_UNITS = 4.0  # A m2 that a volume lacks to be as wide: what its points woul
 GIVEN_UNITS = 1.0  # The same between two lines of the outline.
 NARROW_UNITS = 0.6  # A metre of a step beside a narrower strip, unless it runs along a wall.
 
-# Where a side of a volume of the search begins: along no line of the outline, between two of its
+# Where a side of a new volume begins: along no line of the outline, between two of its
 # corners, each metre off.
 LOOSE_UNITS, CHORD_UNITS, OFF_UNITS_A_METRE = 2.0, 0.3, 0.1
 
@@ -56,26 +54,5 @@ def compute_unit(density: float, settings) -> float:
     return float(points) * DETAIL_FACTOR[settings.detail]
 
 
-# What structure costs in the search, which draws nothing, in units.
-
-PART_COST = 1.0  # a volume, besides its offsets and slopes
-REPLACING_COST, BASE_COST = 0.5, 0.95  # a volume that replaces others; a visible base
-LOOSE_COST = 0.6  # an edge where neither a corner of the outline nor another volume has one
-
 KIND_COST = np.array([1.0, 1.4, 1.4, 1.9])
 """A plane among the candidates: level, sloping along u, along v, and freely."""
-
-# What a change must gain besides, in units.
-
-FREE_UNITS, FREELY_UNITS = 1.5, 8.0  # a plane that faces no wall; a new volume with such a plane
-REGROWN_UNITS = 0.5  # a roof grown anew: less is gained by cutting finer, too
-
-# How far above the best a change may begin and still become the best, in units.
-
-BEGIN_UNITS, BEGIN_SHARE = 2.0, 0.01  # a move of one volume; besides, a share of the points
-NEW_UNITS, NEW_MOVED_UNITS = 6.0, 1.0
-"""A new volume, and one whose edges were moved once."""
-
-# How much the points of a place must cost for a volume to be looked for.
-
-ROOF_UNITS = 5.0  # of a roof that explains all but poorly

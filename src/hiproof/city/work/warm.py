@@ -82,13 +82,16 @@ def compile_halves() -> bool:
 
 def compile_half(half: str) -> None:
     """Call what runs call, on houses so small that compiling is all that takes time."""
-    from ...fit.roof import draw_parts
+    from ...fit.layout.outline import draw_outline
+    from ...fit.layout.plan import lay_out_plan
+    from ...fit.layout.scene import open_window
+    from ...fit.layout.whole import lay_out_whole
+    from ...fit.roof import read_parts
+    from ...fit.roof.add import list_volumes
+    from ...fit.roof.draft import make_draft
+    from ...fit.roof.site import make_site
+    from ...fit.roof.start import start_roof
     from ...fit.shapes.curved import fit_shapes
-    from ...fit.union.outline import draw_outline
-    from ...fit.union.plan import lay_out_plan
-    from ...fit.union.search import find_volumes
-    from ...fit.union.volumes import make_base
-    from ...fit.union.whole import lay_out_whole
     from ...geometry.point_grid import PointGrid
     from ...method import reconstruct
     from ...simulate import random_compound, uniform_points
@@ -104,11 +107,13 @@ def compile_half(half: str) -> None:
         plan = lay_out_plan(xyz, polygon)
         wholes.append(lay_out_whole(plan, polygon, settings.compound))
     if half == "roof":
-        parts, _ = draw_parts(make_base(float(points[:, 2].min())), wholes[0], settings)
+        draft = make_draft(start_roof(wholes[0], make_site(wholes[0])), make_site(wholes[0]))
+        draft.improve()
+        parts = read_parts(draft.roof, draft.site, wholes[0].outline, wholes[0].plan, ())
         fit_shapes(parts, points, outline, settings)
         return
-    for whole in wholes:
-        find_volumes(whole)
+    if (scene := open_window(wholes[0], wholes[0].box, len(points))) is not None:
+        list(list_volumes(start_roof(wholes[0], make_site(wholes[0])), scene))
     PointGrid(points).inside(outline)
     network = "auto" if find_spec("onnxruntime") else "never"
     one = Settings().replace({"fit": {"parts": "one"}, "segment": {"network": network}})

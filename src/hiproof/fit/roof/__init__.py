@@ -11,9 +11,11 @@ ends        compiled: where the points say that a volume ends
 moves       compiled: moves of a roof, which propose and do not judge
 accept      compiled: the one place that judges, and the loop
 site        what a roof has to explain: points, cells, the outline and its lines
-start       the tables of the volumes that the search found
+draft       a roof that is being improved, and what is known of it
+start       the level roof of a block, and the tables of further volumes
 copies      compiled: volumes copied along a side to where points are unexplained
 add         volumes added where points are unexplained
+grow        a roof grown block by block, and each volume grown anew
 deviations  compiled: how well points determine unknowns and sides
 regions     which polygons each volume roofs
 names       from volumes to planes and sides by place
@@ -33,26 +35,22 @@ from ...primitives.catalogue import CATALOGUE, CURVED
 from ...primitives.family import name_among
 from ...read.plausible import is_plausible
 from ...settings import Settings
+from ..layout.depth import VISIBLE_DEPTH_M
+from ..layout.outline import draw_outline
+from ..layout.plan import Plan, lay_out_plan
+from ..layout.whole import Whole, lay_out_whole
+from ..outcome import BuildingFit
 from ..shapes.curved import fit_shapes
 from ..shapes.regions import exclude_parts, list_polygons
 from ..shapes.shown import find_highest, keep_visible
 from ..shapes.teeth import unite_saw_teeth
-from ..union.depth import VISIBLE_DEPTH_M
-from ..union.fit import BuildingFit
-from ..union.outline import draw_outline
-from ..union.plan import Plan, lay_out_plan
-from ..union.search import count_search_points, find_volumes
-from ..union.whole import Whole, lay_out_whole
-from .accept import LOOP_ROUNDS, improve
-from .add import add_volumes
 from .deviations import estimate_covariance, estimate_side_sigmas, find_anchored
-from .draw import draw_whole_roof, make_drawing
+from .draw import draw_whole_roof
+from .grow import find_roof
 from .names import cut_sides, find_axes, read_planes, read_sides
 from .parts import name_planes
 from .price import Site
 from .regions import list_places
-from .site import make_site
-from .start import start_roof
 from .tables import Tables, make_tables_like
 
 __all__ = ["BuildingFit", "fit_building"]
@@ -93,7 +91,7 @@ def fit_building(
     types = settings.fit.types
     whole = lay_out_whole(plan, outline, settings.compound, types)
     xy = plan.frame.xy_local(whole.raster.list_nodes(VISIBLE_DEPTH_M).T)
-    drawn, price = draw_parts(find_volumes(whole), whole, settings)
+    drawn, price = draw_parts(whole, settings)
     visible = keep_visible(drawn, xy)
     has_teeth = not types or "shed" in types
     parts = unite_saw_teeth(visible) if has_teeth else visible
@@ -105,32 +103,15 @@ def fit_building(
     return BuildingFit(tuple(parts), outline, price, plan.uvz.shape[1], unexplained)
 
 
-def draw_parts(volumes: np.ndarray, whole: Whole, settings: Settings) -> tuple[list[Part], float]:
-    """Draw the search's volumes (k, COLUMNS), improve them until no move saves, and name them.
+def draw_parts(whole: Whole, settings: Settings) -> tuple[list[Part], float]:
+    """Find the roof of a building, and name its parts.
 
     Returns the parts, and the price (points) of the drawn roof.
     """
-    plan, types = whole.plan, settings.fit.types
+    types = settings.fit.types
     keeps_shapes = bool(types) and not {*CATALOGUE} <= {*types, *CURVED}
-    site = make_site(whole, keeps_shapes)
-    roof, price = find_roof(volumes, whole, site)
-    return read_parts(roof, site, whole.outline, plan, types), price
-
-
-def find_roof(volumes: np.ndarray, whole: Whole, site: Site) -> tuple[Tables, float]:
-    """Find a roof that no move makes cheaper, and its price (points).
-
-    It begins with volumes (k, COLUMNS). More are added where points are unexplained, if the search
-    has not seen all of them.
-    """
-    roof = start_roof(volumes, whole.turn, site)
-    trial, drawing = make_tables_like(roof), make_drawing(len(roof.sides))
-    price = improve(roof, trial, site, drawing, np.ones(len(roof.sides), np.bool_), LOOP_ROUNDS)
-    # Else the search has seen every point.
-    is_thinned = whole.plan.uvz.shape[1] > count_search_points(whole.outline.area)
-    if is_thinned and (added := add_volumes(roof, trial, site, drawing, whole)).any():
-        price = improve(roof, trial, site, drawing, added, LOOP_ROUNDS)
-    return roof, price
+    draft = find_roof(whole, keeps_shapes)
+    return read_parts(draft.roof, draft.site, whole.outline, whole.plan, types), draft.price
 
 
 def read_parts(

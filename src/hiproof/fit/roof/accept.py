@@ -23,19 +23,15 @@ from .moves import (
     list_moves,
 )
 from .price import (
-    Known,
     count_known_units,
     fit_unknowns,
-    know,
     know_change,
     list_points,
     list_unknowns,
     list_view,
     price_drawing,
     price_extents,
-    price_known,
     price_misfit,
-    price_roof,
     price_tables,
     widen,
 )
@@ -192,23 +188,16 @@ def make_moves(roof, trial, site, drawing, known, questions, touched):
 
 
 @compiled
-def improve(roof, trial, site, drawing, asked, rounds):
+def improve(roof, trial, site, drawing, known, asked, rounds):
     """Improve a roof by moves that concern volumes `asked` (v,), until none saves.
 
-    Returns its price (points).
+    Returns what is then known of it.
     """
     questions, touched = np.where(asked, ALL_MOVES, NO_MOVES), np.zeros(len(asked), np.int64)
-    lowest = np.inf
     for _ in range(rounds):
-        fit_roof(roof, site, FIT_ROUNDS)
-        known = know(roof, drawing, site)
-        price = price_known(known, site)
-        if price > lowest - LEAST_UNITS * site.unit:
-            return price
-        lowest = price
-        make_moves(roof, trial, site, drawing, known, questions, touched)
+        known = make_moves(roof, trial, site, drawing, known, questions, touched)
         if not touched.any():
-            return price
+            break
         place = 0
         for k in range(roof.counts[VOLUME_COUNT]):
             if roof.n_planes[k] > 0:
@@ -216,24 +205,27 @@ def improve(roof, trial, site, drawing, asked, rounds):
                 place += 1
         questions[place:] = NO_MOVES
         pack(roof)
-    return price_roof(roof, drawing, site)
+    pack(roof)
+    return known
 
 
 @compiled
-def improve_new(roof, new, trial, site, drawing, known, k):
-    """Fit volume k, which is `new` to a roof that is `known`, and make its moves once.
-
-    Returns what is then known.
-    """
+def add_new(roof, new, site, drawing, known, k):
+    """Fit volume k, which is `new` to a roof that is `known`. Returns what is then known."""
     changed, room = np.zeros(len(roof.sides), np.bool_), np.empty((len(roof.sides), 4))
     changed[k] = True
     boxes = room[: list_changes(roof, new, changed, site, room)]
     places, count = list_unknowns(new, site, boxes)
     view, points = list_view(new, boxes), list_points(site, boxes)
     fit_unknowns(new, site, view, points, places, count, FIT_ROUNDS)
-    start = Known(known.costs.copy(), known.corners, known.steps, known.units)
-    start = know_change(new, drawing, site, boxes, BESIDE_M, start)
-    questions = np.where(changed, ALL_MOVES, NO_MOVES)
-    better = make_moves(new, trial, site, drawing, start, questions, np.zeros_like(questions))
-    pack(new)
-    return better
+    return know_change(new, drawing, site, boxes, BESIDE_M, known)
+
+
+@compiled
+def improve_new(roof, trial, site, drawing, known, k):
+    """Make the moves of volume k once. Returns what is then known."""
+    questions = np.full(len(roof.sides), NO_MOVES)
+    questions[k] = ALL_MOVES
+    known = make_moves(roof, trial, site, drawing, known, questions, np.zeros_like(questions))
+    pack(roof)
+    return known

@@ -1,9 +1,8 @@
 """Add volumes where a roof leaves points unexplained.
 
-The search takes some of the points of a large or dense roof. Where many are unexplained, planes
-are found again among these, each with the rectangle in which it gains most, and volumes nearby are
-copied. A new volume joins the others or replaces them. It is kept if the roof with it, improved, is
-cheaper.
+Planes are found among these points, each with the rectangle in which it gains most, and volumes
+nearby are copied. A new volume joins the others or replaces them. The one with which the roof is
+cheapest is kept if the roof, improved, is cheaper than without.
 """
 
 from __future__ import annotations
@@ -12,49 +11,44 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..union.add import FEWEST_UNEXPLAINED, UNEXPLAINED
-from ..union.candidates import (
-    MOST_NEW_PLANES,
-    find_best_rectangles,
-    list_candidates,
-)
-from ..union.grow import prepare_growth
-from ..union.objective import compute_costs
-from ..union.scene import Scene, open_window
-from ..union.search import BLOCK_POINTS
-from ..union.volumes import DIRECTION, REPLACES, U0
-from ..union.whole import Box, Whole
-from .accept import LEAST_UNITS, improve_new
+from ..candidates.listing import MOST_NEW_PLANES, find_best_rectangles, list_candidates, locate
+from ..candidates.volumes import DIRECTION, REPLACES, U0
+from ..layout.scene import Scene, open_window
+from ..layout.whole import Box, Whole
+from ..misfit import compute_costs
+from .accept import add_new, improve_new
 from .copies import add_copy, list_copies
-from .draw import Drawing, compute_heights
-from .price import OVER_M, Known, Site, know, price_known
+from .draft import Draft
+from .draw import compute_heights
+from .price import OVER_M, Site
 from .start import add_volume, put_on_walls
-from .tables import VOLUME_COUNT, Tables, copy_tables, make_tables_like
+from .tables import VOLUME_COUNT, Tables
 
+UNEXPLAINED = 0.98  # Share of the highest misfit from which on a point counts as unexplained.
+FEWEST_UNEXPLAINED = 4  # Fewest unexplained points that are worth a further volume.
 SQUARE_M = 3.0  # Size (m) of a square in which unexplained points are counted.
 AROUND = 2  # Squares around one that count, too.
 MOST_PLACES = 10  # Most places of a roof that are tried: a limit on time.
 PLACE_UNITS = 4.0  # Units that the points must be worth that a place leaves unexplained.
 WINDOW_M = 20.0  # Size (m) of a place's window.
-TRIED = 2  # Candidates that join, and that replace, those that gain most.
+TRIED = 4  # Candidates that join, that replace, and that are copies: those that gain most.
+IMPROVED = 3  # Additions, the cheapest before their moves, that are improved until one saves.
 ROWS = np.array([1, 16, 16])  # Most volumes, lines and unknowns that a new volume takes.
 
 
-def add_volumes(
-    roof: Tables, trial: Tables, site: Site, drawing: Drawing, whole: Whole
-) -> np.ndarray:
+def add_at_places(draft: Draft, whole: Whole, most_points: int) -> np.ndarray:
     """Add volumes to a roof at each place where that saves.
 
     Returns which volumes (v,) of the roof then lie where any was added.
     """
-    known, windows = know(roof, drawing, site), []
-    for box in list_places(roof, site):
-        scene, start, last = open_window(whole, box, BLOCK_POINTS), known, None
-        while scene is not None and known is not last:
-            last, known = known, add_best(roof, trial, site, drawing, scene, box, known)
-        if known is not start:
+    windows = []
+    for box in list_places(draft.roof, draft.site):
+        scene = open_window(whole, box, most_points)
+        new = draft if scene is None else add_all(draft, scene, box)
+        if new is not draft:
             windows.append(box)
-    (x0, x1, y0, y1), near = roof.boxes.T, np.zeros(len(roof.sides), np.bool_)
+            draft.roof, draft.known = new.roof, new.known
+    (x0, x1, y0, y1), near = draft.roof.boxes.T, np.zeros(len(draft.roof.sides), np.bool_)
     for u0, u1, v0, v1 in windows:
         near |= (x0 < u1) & (x1 > u0) & (y0 < v1) & (y1 > v0)
     return near
@@ -79,40 +73,41 @@ def list_places(roof: Tables, site: Site) -> Iterator[Box]:
         counts[a : a + size, b : b + size] = 0.0
 
 
-def add_best(
-    roof: Tables, trial: Tables, site: Site, drawing: Drawing, scene: Scene, box: Box, known: Known
-) -> Known:
-    """Add the volume that saves most in a window to a roof. Returns what is then known of it."""
+def add_all(draft: Draft, scene: Scene, box: Box) -> Draft:
+    """Add volumes in a window as long as one saves. Returns the roof with them."""
+    better = add_best(draft, scene, box)
+    while better is not None:
+        draft, better = better, add_best(better, scene, box)
+    return draft
+
+
+def add_best(draft: Draft, scene: Scene, box: Box) -> Draft | None:
+    """Return a roof with one volume more in a window, None if none saves or there is no room."""
+    roof = draft.roof
     if (roof.counts + ROWS > [len(roof.sides), len(roof.lines), len(roof.values)]).any():
-        return known
-    best, best_known, lowest = roof, known, price_known(known, site) - LEAST_UNITS * site.unit
-    for new, k in list_additions(roof, site, scene, box):
-        after = improve_new(roof, new, trial, site, drawing, known, k)
-        if price_known(after, site) < lowest:
-            best, best_known, lowest = new, after, price_known(after, site)
-    if best is not roof:
-        copy_tables(best, roof)
-    return best_known
+        return None
+    found = []
+    for new, k in list_additions(draft, scene, box):
+        new.known = add_new(roof, new.roof, new.site, new.drawing, new.known, k)
+        found.append((new, k))
+    for new, k in sorted(found, key=lambda addition: addition[0].price)[:IMPROVED]:
+        new.known = improve_new(new.roof, new.trial, new.site, new.drawing, new.known, k)
+        if new.price < draft.price - draft.least_gain:
+            return new
+    return None
 
 
-def list_additions(
-    roof: Tables, site: Site, scene: Scene, box: Box
-) -> Iterator[tuple[Tables, int]]:
+def list_additions(draft: Draft, scene: Scene, box: Box) -> Iterator[tuple[Draft, int]]:
     """Yield roofs with one volume more in a window, and its number: a copy or a new one."""
-    for source, x, y in list_copies(roof, site, np.array(box), UNEXPLAINED)[:TRIED]:
-        new = copy_roof(roof)
-        yield new, add_copy(new, int(source), x, y)
-    for volume in list_volumes(roof, scene):
-        new = copy_roof(roof)
-        k = add_volume(new, volume, scene.turn)
-        put_on_walls(new, k, site, True)
+    site = draft.site
+    for source, x, y in list_copies(draft.roof, site, np.array(box), UNEXPLAINED)[:TRIED]:
+        new = draft.copy()
+        yield new, add_copy(new.roof, int(source), x, y)
+    for volume in list_volumes(draft.roof, scene):
+        new = draft.copy()
+        k = add_volume(new.roof, volume, scene.turn)
+        put_on_walls(new.roof, k, site, True)
         yield new, k
-
-
-def copy_roof(roof: Tables) -> Tables:
-    new = make_tables_like(roof)
-    copy_tables(roof, new)
-    return new
 
 
 def list_volumes(roof: Tables, scene: Scene) -> Iterator[np.ndarray]:
@@ -122,12 +117,9 @@ def list_volumes(roof: Tables, scene: Scene) -> Iterator[np.ndarray]:
     unexplained = np.flatnonzero(costs[: scene.n] > UNEXPLAINED)
     if len(unexplained) < FEWEST_UNEXPLAINED:
         return
-    candidates = list_candidates(scene, unexplained, MOST_NEW_PLANES)
-    ground = prepare_growth(scene, candidates)
+    candidates, cells = list_candidates(scene, unexplained, MOST_NEW_PLANES), locate(scene)
     for replaces in (False, True):
-        gains, rectangles = find_best_rectangles(
-            scene, candidates, ground.cell_u, ground.cell_v, costs, z, replaces
-        )
+        gains, rectangles = find_best_rectangles(scene, candidates, *cells, costs, z, replaces)
         candidates[:, REPLACES] = replaces
         for m in np.argsort(-gains, kind="stable")[:TRIED].tolist():
             if gains[m] > 0.0:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...compiled import compiled
-from ..union.objective import compute_point_cost
+from ..misfit import compute_point_cost
 from .draw import is_near
 from .price import compute_costs, list_points
 from .tables import N_SIDES, VOLUME_COUNT, add_line, find_lowest_plane, place_volume, read_line

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...compiled import compiled
 from ...geometry.arrays import measure_range
-from ..union.objective import compute_point_cost
+from ..misfit import compute_point_cost
 from .draw import compute_height
 from .price import (
     OVER_M,

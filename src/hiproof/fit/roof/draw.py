@@ -26,7 +26,7 @@ from .tables import (
     place_volume,
 )
 
-HIDDEN_M = 0.25  # A volume begins to reach so far (m) below what hides it, and no further.
+HIDDEN_M = 0.01  # A side reaches no further (m) below what hides it.
 RING_CORNERS = 40  # Most corners of a fragment.
 MOST_FRAGMENTS = 4000  # Most fragments of what is drawn at once.
 PIECE_ROOM = 200  # Most fragments of one plane in one piece of the outline.

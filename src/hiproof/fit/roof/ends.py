@@ -9,14 +9,17 @@ from __future__ import annotations
 import numpy as np
 
 from ...compiled import compiled
+from ..candidates.volumes import SLOPE_HIGH, SLOPE_LOW
 from ..prices import LEAN_UNITS
-from .tables import N_SIDES, measure_middle
+from .tables import N_SIDES, find_lowest_plane, measure_middle
 
 REACH_M = 2.5  # Distance (m) from a side within which it may lie instead.
 FEWEST = 4  # Fewest points on either side of a line that points show.
 MOST = 600  # Most points that are asked. Of more, every k-th is.
 BIN_M = 0.02  # Width (m) of a bin of points.
 LEANS = 12  # Ways to lean to either side.
+PAIRS = 24  # Pairs of points through which a plane is tried.
+LEAST_RUN_M = 0.4  # Least distance (m) between the points of a pair, across the side.
 LEAN_STEP = 0.02  # Steps (rise over run) in which a line leans.
 
 
@@ -114,3 +117,98 @@ def list_near(roof, k, s, x, y, site):
             lowest = min(lowest, row[0] * u + row[1] * v + row[2])
         is_on[m] = abs(site.z[numbers[m]] - lowest) < site.dead + site.width
     return across, along, is_on, step
+
+
+@compiled
+def list_inside(roof, k, site):
+    """List the points inside the sides of volume k, and how far (m) each lies above its planes."""
+    box = roof.boxes[k]
+    first, last = np.searchsorted(site.x[: site.n], box[:2])
+    numbers, gaps, count = np.empty(last - first, np.int64), np.empty(last - first), 0
+    for i in range(first, last):
+        u, v, is_inside = site.x[i], site.y[i], True
+        for s in range(N_SIDES):
+            half = roof.half_planes[k, s]
+            is_inside &= half[0] * u + half[1] * v + half[2] >= 0.0
+        if is_inside:
+            lowest, _ = find_lowest_plane(roof, k, u, v)
+            numbers[count], gaps[count] = i, site.z[i] - lowest
+            count += 1
+    return numbers[:count], gaps[:count]
+
+
+@compiled
+def measure_from(roof, k, s, site, numbers):
+    """Return the distances (n,) of the points of such `numbers` (n,) from side s of volume k."""
+    half = roof.half_planes[k, s]
+    return half[0] * site.x[numbers] + half[1] * site.y[numbers] + half[2]
+
+
+@compiled
+def find_plane(roof, k, s, height, site):
+    """Return height and slope of a plane that rises from side s of volume k.
+
+    Most points well below the volume lie on it. It rises from a given `height`, unless that is NaN.
+    The slope is NaN if points show no plane.
+    """
+    reach, best_height, best_slope, most = site.dead + site.width, 0.0, np.nan, FEWEST - 1
+    numbers, gaps = list_inside(roof, k, site)
+    below = numbers[gaps < -reach]
+    below = below[:: 1 + len(below) // MOST]
+    n, distances, heights = len(below), measure_from(roof, k, s, site, below), site.z[below]
+    order = np.argsort(distances, kind="mergesort")
+    distances, heights = distances[order], heights[order]
+    for pair in range(PAIRS if n >= FEWEST else 0):
+        i = pair * n // PAIRS
+        j = (i + n // 2 - pair % 3 * n // 6) % n
+        run, rise = distances[j] - distances[i], heights[j] - heights[i]
+        if not np.isnan(height):
+            run, rise = distances[i], heights[i] - height
+        if abs(run) < LEAST_RUN_M or not SLOPE_LOW < rise / run < SLOPE_HIGH:
+            continue
+        start = heights[i] - rise / run * distances[i]
+        count = int(np.count_nonzero(np.abs(heights - start - rise / run * distances) < reach))
+        if count > most:
+            most, best_height, best_slope = count, start, rise / run
+    return best_height, best_slope
+
+
+@compiled
+def find_split(roof, k, s, site):
+    """Return how far from side s of volume k its points begin to lie higher or lower.
+
+    Also returns how far (m) those beyond lie above its planes. The distance is 0 if hardly a point
+    lies on the volume.
+    """
+    numbers, gaps = list_inside(roof, k, site)
+    is_on = np.abs(gaps) < 2.0 * (site.dead + site.width)
+    n = np.count_nonzero(is_on)
+    if n < 2 * FEWEST:
+        return 0.0, 0.0
+    distances = measure_from(roof, k, s, site, numbers[is_on])
+    order = np.argsort(distances, kind="mergesort")
+    distances, sums = distances[order], np.cumsum(gaps[is_on][order])
+    before = np.arange(FEWEST, n - FEWEST + 1)
+    sum_before, total = sums[before - 1], sums[-1]
+    m = np.argmax(sum_before**2 / before + (total - sum_before) ** 2 / (n - before))
+    place = 0.5 * (distances[before[m] - 1] + distances[before[m]])
+    return place, (total - sum_before[m]) / (n - before[m])
+
+
+@compiled
+def find_gable(roof, k, s, site):
+    """Return height and slope of two planes that rise from side s of volume k and from across.
+
+    They fit the points within a metre of the volume. The slope is NaN if they do not rise.
+    """
+    numbers, gaps = list_inside(roof, k, site)
+    near = numbers[np.abs(gaps) < 1.0]
+    if len(near) < FEWEST:
+        return 0.0, np.nan
+    first, second = measure_from(roof, k, s, site, near), measure_from(roof, k, s ^ 1, site, near)
+    runs, heights = np.minimum(first, second), site.z[near]
+    spread = ((runs - runs.mean()) ** 2).sum()
+    slope = ((runs - runs.mean()) * heights).sum() / max(spread, 1e-9)
+    if not SLOPE_LOW < slope < SLOPE_HIGH:
+        return 0.0, np.nan
+    return heights.mean() - slope * runs.mean(), slope

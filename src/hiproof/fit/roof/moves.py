@@ -11,7 +11,7 @@ import numpy as np
 from ...compiled import compiled
 from ..prices import LEAN_UNITS
 from .draw import is_near, widen_box
-from .ends import find_end
+from .ends import find_end, find_gable, find_plane, find_split
 from .tables import (
     FAR_M,
     LINE_COUNT,
@@ -32,7 +32,7 @@ from .tables import (
 )
 
 (
-    LEAVE_OUT,  # volume a
+    LEAVE_OUT,  # volume a; if b, those around reach to where their planes rise from
     LEAVE_PLANE,  # plane b of volume a
     SHARE,  # unknown b becomes a, which keeps its value: points all around it hold it
     TO_OUTLINE,  # side b of volume a on line c of the outline
@@ -44,7 +44,7 @@ from .tables import (
     GIVE_WALL,  # volume a a plane from line b of the outline, with slope c and height d of others
     LEVEL_EAVES,  # all sloping planes of volume a rise from its sides at one height, with one slope
     # if b, and from all walls that cut its corners off if c
-    TILT,  # the level plane b of volume a rises from its side c
+    TILT,  # the level plane b of volume a rises from its side c, and one from across if d
     MAKE_LEVEL,  # plane b of volume a becomes level, and its only one if c
     ADD_BAY,  # a level volume over bay a of the outline
     ONE_PLANE,  # plane b of volume a becomes plane d of volume c
@@ -53,7 +53,9 @@ from .tables import (
     TO_EAVE,  # plane b of volume a rises from height c, and so does the side that it faces
     TO_POINTS,  # side b of volume a where points say that it ends, as it leans
     TAKE,  # plane d of volume c becomes one more of volume a, whose side b runs on if it is one
-) = range(19)
+    END,  # volume a a plane from its side b, at the height of others if c
+    SPLIT,  # volume a where its points begin to lie higher or lower beyond its side b
+) = range(21)
 MOVE_COLUMNS = 5  # Numbers of a move: its kind and four more.
 # What to try of a volume. One whose unknowns are shared is where it was.
 NO_MOVES, SHARES_ONLY, ALL_MOVES = range(3)
@@ -68,7 +70,8 @@ FACING_COSINE = 0.9  # The same of a plane and the side that it faces.
 ALIKE_COSINE = 0.7  # The same of a plane and one of another volume that may end it instead.
 BESIDE_CORNER_M = 0.1  # Distance (m) outside a volume of the middle of a wall over its corner.
 BESIDE_WALL_M = 0.3  # Distance (m) from the middle of a wall of a line that is meant to be its own.
-COVER_M = 0.3  # Least distance (m) of a side from the wall to which its volume is drawn out.
+# Least distance (m) of a side from the wall, or the line of its plane, to which it is drawn out.
+COVER_M = 0.3
 MOST_LINES = 7  # Most lines to which a side is moved.
 RUN_ON_STEPS_M = (0.6, 1.5, 3.0)  # Distances (m) by which a side is run on.
 SAME_FAR = 0.03  # The same of volumes that are not near each other.
@@ -94,7 +97,8 @@ def list_moves(roof, site, asked, moves):
         if asked[k] < ALL_MOVES or roof.n_planes[k] == 0:
             continue
         box = roof.boxes[k]
-        count = write_move(moves, count, LEAVE_OUT, k, 0, 0, 0)
+        for reach in range(2):
+            count = write_move(moves, count, LEAVE_OUT, k, reach, 0, 0)
         for p in range(roof.n_planes[k]):
             if roof.n_planes[k] > 1 and not site.keeps_shapes:
                 count = write_move(moves, count, LEAVE_PLANE, k, p, 0, 0)
@@ -106,10 +110,13 @@ def list_moves(roof, site, asked, moves):
                         count = write_move(moves, count, TO_EAVE, k, p, roof.heights[k, q], 0)
             elif roof.n_planes[k] == 1 and not site.keeps_shapes:
                 for s in range(N_SIDES):
-                    count = write_move(moves, count, TILT, k, p, s, 0)
+                    for pair in range(1 + (s + 1) % 2):
+                        count = write_move(moves, count, TILT, k, p, s, pair)
         for way in range(FACE_SIDES, FACE_SECOND + 1):
             count = write_move(moves, count, FACE, k, way, 0, 0)
         count = write_move(moves, count, TURN, k, 0, 0, 0)
+        for s in range(0, N_SIDES, 2):
+            count = write_move(moves, count, SPLIT, k, s, 0, 0)
         count = list_side_moves(roof, site, k, moves, count)
         count = list_new_planes(roof, site, k, moves, count)
         cuts = 0
@@ -302,6 +309,10 @@ def list_new_planes(roof, site, k, moves, count):
     """Write planes of volume k over walls that have none yet."""
     if roof.n_planes[k] >= VOLUME_PLANES or site.keeps_shapes:
         return count
+    for s in range(N_SIDES):
+        if not is_faced(roof, k, roof.half_planes[k, s, 0], roof.half_planes[k, s, 1]):
+            for is_level in range(2):
+                count = write_move(moves, count, END, k, s, is_level, 0)
     for p in range(roof.n_planes[k]):
         if roof.slopes[k, p] < 0:
             continue
@@ -374,6 +385,7 @@ def apply_move(roof, move, site, changed):
     is_possible = True
     if kind == LEAVE_OUT:
         roof.n_planes[a] = 0
+        is_possible = b == 0 or spread(roof, a, changed)
     elif TO_OUTLINE <= kind <= RUN_ON:
         line = find_new_side(roof, kind, a, b, c, site)
         is_possible = line != 0
@@ -405,6 +417,10 @@ def apply_move(roof, move, site, changed):
         is_possible = d != 0.0 or e != 0.0
         if is_possible:
             roof.sides[a, b] = add_line(roof, d, e, f, LEAN_UNITS)
+    elif kind == SPLIT:
+        is_possible = split(roof, a, b, site, changed)
+    elif kind == END:
+        is_possible = end(roof, a, b, c, site)
     elif kind == COVER:
         is_possible = cover(roof, a, b, c, d, site)
     elif kind == LEVEL_EAVES:
@@ -413,6 +429,66 @@ def apply_move(roof, move, site, changed):
         is_possible = change_plane(roof, move, site)
     place_volume(roof, a)
     return is_possible
+
+
+@compiled
+def end(roof, k, s, is_level, site):
+    """Give volume k a plane from its side s, through points well below it.
+
+    It may rise from a height of the volume's other planes (`is_level`). Returns whether it does.
+    """
+    height = roof.heights[k, 0]
+    for p in range(1, roof.n_planes[k]):
+        height = roof.heights[k, p] if roof.slopes[k, p] >= 0 else height
+    start, slope = find_plane(roof, k, s, roof.values[height] if is_level else np.nan, site)
+    if np.isnan(slope):
+        return False
+    height = height if is_level else add_unknown(roof, start)
+    add_plane(roof, k, roof.sides[k, s], height, add_unknown(roof, slope))
+    return True
+
+
+@compiled
+def split(roof, k, s, site, changed):
+    """Split volume k where its points begin to lie higher or lower beyond side s."""
+    place, rise = find_split(roof, k, s, site)
+    if place <= 0.0:
+        return False
+    a, b, c = read_line(roof, roof.sides[k, s])
+    line, new = add_line(roof, a, b, c - place), roof.counts[VOLUME_COUNT]
+    roof.counts[VOLUME_COUNT] = new + 1
+    roof.sides[new], roof.n_planes[new] = roof.sides[k], roof.n_planes[k]
+    roof.plane_lines[new], roof.slopes[new] = roof.plane_lines[k], roof.slopes[k]
+    roof.replaces[new], changed[new] = roof.replaces[k], True
+    roof.sides[new, s], roof.sides[k, s ^ 1] = line, -line
+    roof.heights[new] = roof.heights[k]
+    for p in range(roof.n_planes[k]):
+        height = roof.heights[k, p]
+        if roof.heights[new, p] == height:  # else it is that of a plane before
+            raised = add_unknown(roof, roof.values[height] + rise)
+            for q in range(p, roof.n_planes[k]):
+                if roof.heights[k, q] == height:
+                    roof.heights[new, q] = raised
+    place_volume(roof, new)
+    return True
+
+
+@compiled
+def spread(roof, k, changed):
+    """Let the volumes around volume k reach to where their planes rise from. Returns if any do."""
+    has_changed = False
+    for j in range(roof.counts[VOLUME_COUNT]):
+        if roof.n_planes[j] == 0 or not is_near(roof.boxes[j], roof.boxes[k], NEIGHBOUR_M):
+            continue
+        for s in range(N_SIDES):
+            a, b, c = read_line(roof, roof.sides[j, s])
+            for p in range(roof.n_planes[j]):
+                d, e, f = read_line(roof, roof.plane_lines[j, p])
+                if roof.slopes[j, p] >= 0 and a * d + b * e > LINE_COSINE and f > c + COVER_M:
+                    roof.sides[j, s] = roof.plane_lines[j, p]
+                    has_changed = changed[j] = True
+        place_volume(roof, j)
+    return has_changed
 
 
 @compiled
@@ -448,6 +524,12 @@ def change_plane(roof, move, site):
             line = add_line(roof, d, e, -d * x - e * y)
         roof.heights[k, b] = add_unknown(roof, roof.values[roof.heights[k, b]])
         roof.plane_lines[k, b], roof.slopes[k, b] = line, add_unknown(roof, 0.0)
+        if move[4]:
+            height, slope = find_gable(roof, k, c, site)
+            if np.isnan(slope):
+                return False
+            roof.values[roof.heights[k, b]], roof.values[roof.slopes[k, b]] = height, slope
+            add_plane(roof, k, roof.sides[k, c ^ 1], roof.heights[k, b], roof.slopes[k, b])
     elif kind == TO_EAVE and not is_level:
         return put_on_eave(roof, k, b, c, site)
     elif kind == MAKE_LEVEL and not is_level:
@@ -467,13 +549,16 @@ def change_plane(roof, move, site):
 def put_on_eave(roof, k, p, height, site):
     """Let plane p of volume k rise from where it has another's `height`, and its side lie there.
 
-    It rises from a wall that is near there. What rises from a wall stays there.
+    It rises from a wall that is near there. What rises from a wall does not reach beyond it then.
     """
     slope = roof.values[roof.slopes[k, p]]
     a, b, c = read_line(roof, roof.plane_lines[k, p])
-    if abs(slope) < ALIKE_SLOPES or find_wall(site, a, b, c) >= 0:
+    if abs(slope) < ALIKE_SLOPES:
         return False
-    c += (roof.values[roof.heights[k, p]] - roof.values[height]) / slope
+    out = (roof.values[roof.heights[k, p]] - roof.values[height]) / slope
+    if out > 0.0 and find_wall(site, a, b, c) >= 0:
+        return False
+    c += out
     m = find_wall(site, a, b, c)
     if m >= 0:
         a, b, c = site.lines[m, 0], site.lines[m, 1], site.lines[m, 2]

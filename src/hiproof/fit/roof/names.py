@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 import shapely
 
-from ..union.volumes import LEVEL
+from ..candidates.volumes import LEVEL
 from .parts import GIVEN_M, STRAIGHT, OutlineWall, Planes, Side
 from .tables import N_SIDES, UNKNOWN_COUNT, Tables, read_line
 

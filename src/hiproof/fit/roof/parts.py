@@ -13,7 +13,7 @@ import shapely
 from ...frames import PlanFrame
 from ...model import Part
 from ...primitives.family import SIGN, Member, name_among
-from ..union.volumes import LEVEL, N_SIDES
+from ..candidates.volumes import LEVEL, N_SIDES
 
 LEVEL_EAVE_M = 0.5  # An eave that would be level with its side so little (m) further out is level.
 # Share of the half of its rectangle by which a hidden side may move to where its eave is level.

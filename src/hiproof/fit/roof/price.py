@@ -11,6 +11,7 @@ from collections import namedtuple
 import numpy as np
 
 from ...compiled import compiled
+from ..misfit import compute_cell_cost, compute_point_cost
 from ..prices import (
     CORNER_UNITS,
     GIVEN_UNITS,
@@ -21,7 +22,6 @@ from ..prices import (
     UNKNOWN_UNITS,
     VOLUME_UNITS,
 )
-from ..union.objective import compute_cell_cost, compute_point_cost
 from .draw import (
     RING_CORNERS,
     compute_heights,

@@ -7,10 +7,10 @@ import shapely
 
 from ...geometry.point_in_polygon import find_inside
 from ...geometry.rings import ring_edges
+from ..layout.plan import HEIGHT_MARGIN_M
+from ..layout.scene import LEAST_CELLS, lay_grid, lay_unobserved_cells
+from ..layout.whole import Whole
 from ..prices import DEAD_M, NARROW_M
-from ..union.plan import HEIGHT_MARGIN_M
-from ..union.scene import LEAST_CELLS, lay_grid, lay_unobserved_cells
-from ..union.whole import Whole
 from .draw import RING_CORNERS
 from .price import Site
 

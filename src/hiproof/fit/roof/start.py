@@ -1,13 +1,13 @@
-"""Begin with the volumes of the search: rows of rectangles and planes become tables."""
+"""Begin a roof, and add volumes to it: rows of rectangles and planes become tables."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from ...compiled import compiled
-from ..prices import CHORD_UNITS, LOOSE_UNITS, OFF_UNITS_A_METRE
-from ..union.volumes import (
+from ..candidates.volumes import (
     ALL_EQUAL,
+    COLUMNS,
     DIRECTION,
     LEAN0,
     LEVEL,
@@ -19,7 +19,8 @@ from ..union.volumes import (
     U0,
     V1,
 )
-from .draw import draw_in, draw_whole_roof
+from ..layout.whole import Whole
+from ..prices import CHORD_UNITS, LOOSE_UNITS, OFF_UNITS_A_METRE
 from .ends import find_end
 from .moves import LINE_COSINE
 from .price import Site, list_points, list_view, price_misfit, widen
@@ -28,6 +29,7 @@ from .tables import (
     LINE_COUNT,
     N_SIDES,
     NO_UNKNOWN,
+    UNKNOWN_COUNT,
     VOLUME_COUNT,
     Tables,
     add_line,
@@ -39,22 +41,59 @@ from .tables import (
     read_line,
 )
 
-ROOM = 2  # Room for so many times the volumes that there are.
+ROOM = 40  # Most volumes of a block, those that are tried included.
+# Quantile of the heights at which the base lies: below all roofs but not below a stray point.
+BASE_QUANTILE = 0.02
 NEAR_WALL_M = 1.0  # A line of the outline so near (m) the middle of a side may be the side.
 MOST_SWING = 0.5 * np.sqrt(1.0 - LINE_COSINE**2)  # How far (of its length) an end then moves more.
 PARALLEL_COSINE = 1.0 - 1e-12  # Cosine of the angle up to which two lines are parallel.
 
 
-def start_roof(volumes: np.ndarray, turns: np.ndarray, site: Site) -> Tables:
-    """Return the tables of the search's volumes (k, COLUMNS) along walls."""
-    size = ROOM * len(volumes) + 8
-    roof = make_tables(size, 8 * size, 8 * size)
-    for volume in volumes:
-        add_volume(roof, volume, turns)
-    draw_in(roof, draw_whole_roof(roof, site))
-    for k in range(len(volumes)):
-        put_on_walls(roof, k, site, False)
+def start_roof(whole: Whole, site: Site, quantile: float = BASE_QUANTILE) -> Tables:
+    """Return a level roof at a quantile of the points of a block, with room for more volumes."""
+    roof = make_tables(ROOM, 8 * ROOM, 8 * ROOM)
+    z = np.sort(whole.plan.uvz[2])
+    base = np.zeros(COLUMNS)
+    base[OFFSET0 : OFFSET0 + LEVEL] = np.inf
+    base[OFFSET0 + LEVEL] = z[int(quantile * (len(z) - 1))]
+    base[U0 : V1 + 1] = whole.box
+    put_on_walls(roof, add_volume(roof, base, whole.turn), site, False)
     return roof
+
+
+def join_roofs(roofs: list[Tables]) -> Tables:
+    """Return the volumes of all roofs in one, with room for as many more."""
+    volumes = sum(int(roof.counts[VOLUME_COUNT]) for roof in roofs)
+    size = 2 * volumes + ROOM
+    joined = make_tables(size, 8 * size, 8 * size)
+    for roof in roofs:
+        append_roof(joined, roof)
+    return joined
+
+
+@compiled
+def append_roof(roof, other):
+    """Add all volumes of another roof."""
+    first = roof.counts[UNKNOWN_COUNT]
+    for u in range(other.counts[UNKNOWN_COUNT]):
+        add_unknown(roof, other.values[u])
+    numbers = np.zeros(other.counts[LINE_COUNT], np.int64)
+    for l in range(len(numbers)):
+        a, b, c, units = other.lines[l]
+        numbers[l] = add_line(roof, a, b, c, units)
+    for k in range(other.counts[VOLUME_COUNT]):
+        new = roof.counts[VOLUME_COUNT]
+        roof.counts[VOLUME_COUNT] = new + 1
+        roof.replaces[new], roof.n_planes[new] = other.replaces[k], 0
+        for s in range(N_SIDES):
+            line = other.sides[k, s]
+            roof.sides[new, s] = numbers[abs(line) - 1] * (1 if line > 0 else -1)
+        for p in range(other.n_planes[k]):
+            line, slope = other.plane_lines[k, p], other.slopes[k, p]
+            signed = numbers[abs(line) - 1] * (1 if line > 0 else -1)
+            height = first + other.heights[k, p]
+            add_plane(roof, new, signed, height, first + slope if slope >= 0 else NO_UNKNOWN)
+        place_volume(roof, new)
 
 
 def add_volume(roof: Tables, volume: np.ndarray, turns: np.ndarray) -> int:

@@ -229,10 +229,24 @@ def measure_middle(roof, k, s, box):
 
 
 @compiled
+def is_double(roof, k, p):
+    """Return whether plane p of volume k is another of its planes, too."""
+    for q in range(roof.n_planes[k]):
+        is_same = q != p and roof.plane_lines[k, q] == roof.plane_lines[k, p]
+        if is_same and roof.heights[k, q] == roof.heights[k, p]:
+            if roof.slopes[k, q] == roof.slopes[k, p]:
+                return True
+    return False
+
+
+@compiled
 def pack(roof):
-    """Remove volumes that were left out, and lines and unknowns that nothing uses."""
+    """Remove what was left out or is there twice, and lines and unknowns that nothing uses."""
     place = 0
     for k in range(roof.counts[VOLUME_COUNT]):
+        for p in range(roof.n_planes[k] - 1, 0, -1):
+            if is_double(roof, k, p):
+                drop_plane(roof, k, p)
         if roof.n_planes[k] == 0:
             continue
         if place < k:

@@ -1,14 +1,13 @@
-"""Describe a roof under construction: volumes as rows of one array. Compiled.
+"""Describe candidates for volumes as rows of one array. Compiled.
 
 A volume is a rectangle in one of the building's directions and a min of at most five planes in its
 own axes u, v:
 
     rising along +u, rising along -u, rising along +v, rising along -v, level
 
-The four inclined ones may lean: they then face square to a wall that is not quite along the axes.
-The roof is the max of the volumes in whose rectangle a place lies. A volume that replaces others (a
-recess cut into a slope, a low annex beside a gable's wall) hides within it all that came before.
-Row 0 is the base: level, and everywhere.
+The four inclined ones may lean: they then face square to a wall that is not quite along the axes. A
+volume that replaces others (a recess cut into a slope, a low annex beside a gable's wall) hides
+within it all that came before.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...compiled import compiled
-from ..prices import PART_COST, REPLACING_COST, SKEW_UNITS, UNKNOWN_UNITS
+from ..prices import SKEW_UNITS, UNKNOWN_UNITS, VOLUME_UNITS
 
 DIRECTION = 0  # Column of a volume's row: the number of its direction.
 # Columns of its rectangle, in metres of that direction's axes.
@@ -42,15 +41,6 @@ SLOPE_LOW = 0.01  # A flatter slope (rise over run), half a degree, is level.
 SLOPE_HIGH = 2.75  # A steeper slope (rise over run), 70 degrees, is a wall.
 
 
-def make_base(height: float) -> np.ndarray:
-    """Return volumes (1, COLUMNS): the level base at `height`."""
-    volumes = np.zeros((1, COLUMNS))
-    volumes[0, OFFSET0 : OFFSET0 + N_PLANES] = np.inf
-    volumes[0, OFFSET0 + LEVEL] = height
-    volumes[0, U0 : V1 + 1] = (-1e4, 1e4, -1e4, 1e4)
-    return volumes
-
-
 @compiled
 def read_coefficients(volumes, k):
     """Return the numbers of volume k's planes.
@@ -73,21 +63,6 @@ def read_coefficients(volumes, k):
 
 
 @compiled
-def read_rectangle(volumes, k):
-    """Return where volume k begins and ends along u and along v."""
-    return volumes[k, 1], volumes[k, 2], volumes[k, 3], volumes[k, 4]
-
-
-@compiled
-def is_within(ends, u, v):
-    """Return whether u, v lies in a rectangle with these `ends`.
-
-    It has no branches, so a processor computes several places at once.
-    """
-    return (ends[0] <= u) & (u <= ends[1]) & (ends[2] <= v) & (v <= ends[3])
-
-
-@compiled
 def find_lowest(c, u, v):
     """Return the height at u, v of a volume with coefficients c.
 
@@ -99,19 +74,6 @@ def find_lowest(c, u, v):
 
 
 @compiled
-def find_lowest_plane(c, u, v):
-    """Return the height at u, v, and the lowest plane there."""
-    z0, z1 = c[0] + c[5] * u + c[9] * v, c[1] - c[6] * u + c[10] * v
-    z2, z3 = c[2] + c[7] * v + c[11] * u, c[3] - c[8] * v + c[12] * u
-    best, plane = c[4], LEVEL
-    best, plane = (z0, 0) if z0 < best else (best, plane)
-    best, plane = (z1, 1) if z1 < best else (best, plane)
-    best, plane = (z2, 2) if z2 < best else (best, plane)
-    best, plane = (z3, 3) if z3 < best else (best, plane)
-    return best, plane
-
-
-@compiled
 def measure_run(row, k, u, v):
     """Return the run of plane k of a volume at u, v: metres from the axes' origin.
 
@@ -119,22 +81,6 @@ def measure_run(row, k, u, v):
     """
     x, y = (u, v) if k < 2 else (v, u)
     return (x if k % 2 == 0 else -x) + row[LEAN0 + k] * y
-
-
-@compiled
-def compute_roof_heights(volumes, U, V):
-    """Return the height (n,) of the roof and the visible volume (n,) at U, V (directions, n)."""
-    n = U.shape[1]
-    z, top = np.full(n, -np.inf), np.zeros(n, np.int64)
-    for k in range(len(volumes)):
-        direction = int(volumes[k, DIRECTION])
-        u, v, ends = U[direction], V[direction], read_rectangle(volumes, k)
-        c, replaces = read_coefficients(volumes, k), volumes[k, REPLACES] > 0.0
-        for i in range(n):  # no branches: a processor does several points at once
-            h = find_lowest(c, u[i], v[i])
-            shows = is_within(ends, u[i], v[i]) & (replaces | (h > z[i]))
-            z[i], top[i] = h if shows else z[i], k if shows else top[i]
-    return z, top
 
 
 @compiled
@@ -160,11 +106,10 @@ def count_planes(row):
 @compiled
 def price_volume(row):
     """Return the units of one volume without its edges."""
-    replacing = REPLACING_COST if row[REPLACES] > 0.0 else 0.0
     leaning = 0.0
     for k in range(N_SIDES):
         leaning += SKEW_UNITS if row[LEAN0 + k] != 0.0 and row[OFFSET0 + k] < np.inf else 0.0
-    return PART_COST + UNKNOWN_UNITS * (count_planes(row) + count_slopes(row)) + replacing + leaning
+    return VOLUME_UNITS + UNKNOWN_UNITS * (count_planes(row) + count_slopes(row)) + leaning
 
 
 @compiled

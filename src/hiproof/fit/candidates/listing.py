@@ -9,11 +9,11 @@ import numpy as np
 
 from ...compiled import compiled
 from ...geometry.arrays import copy_row, copy_rows, sort_values
-from .objective import compute_cell_cost, compute_point_cost
-from .plan import find_cells
+from ..layout.plan import Cloud, find_cells
+from ..layout.scene import Scene
+from ..misfit import compute_cell_cost, compute_point_cost
 from .planes import (
     RIDGE_STEP_M,
-    Cloud,
     Grid,
     bound_rows,
     classify_plane,
@@ -22,7 +22,6 @@ from .planes import (
     pool_gables,
     pool_planes,
 )
-from .scene import Scene
 from .volumes import (
     ALL_EQUAL,
     COLUMNS,
@@ -48,9 +47,9 @@ MOST_TOPS = 2  # Most level tops that make hips and mansards, strongest first.
 MOST_PAIRS = 3  # Most pairs of slopes that make hips and mansards, strongest first.
 SAME_SLOPE = 1e-6  # Slopes (rise over run) and leans that differ less are numerically equal.
 WRONG_COVER = 0.02  # Price (points) of covering a point without explaining it.
-# Most planes that are found, of all points and of those that a roof leaves unexplained. Structure
-# that explains less stays unseen.
-MOST_PLANES, MOST_NEW_PLANES = 16, 10
+# Most planes that are found among the points that a roof leaves unexplained. What explains less
+# stays unseen.
+MOST_NEW_PLANES = 10
 # Least points among which candidates are found, and around which planes are fitted: limits on time.
 # Of many points they are three in four, and one in eight.
 LEAST_POOL, LEAST_SEEDS = 500, 100
@@ -73,6 +72,15 @@ def list_candidates(scene: Scene, members: np.ndarray, most_planes: int) -> np.n
 def make_grids(scene: Scene) -> list[Grid]:
     """Return the cells between the scene's lines, for each direction."""
     return [Grid(*(axis[np.isfinite(axis)] for axis in lines)) for lines in scene.lines]
+
+
+def locate(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
+    """Return the cells (directions, n + g) along u and along v of a scene's points and cells."""
+    grids = make_grids(scene)
+    return (
+        np.array([find_cells(grid.u, u) for grid, u in zip(grids, scene.U, strict=True)]),
+        np.array([find_cells(grid.v, v) for grid, v in zip(grids, scene.V, strict=True)]),
+    )
 
 
 def list_candidates_along(

@@ -1,7 +1,7 @@
 """List the shapes that volumes may have to become parts of the requested types.
 
 This is a file of its own because compiled code belongs to the sources that its file imports: a new
-roof shape compiles nothing of the search again.
+roof shape compiles no candidates again.
 """
 
 from __future__ import annotations

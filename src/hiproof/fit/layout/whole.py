@@ -1,4 +1,4 @@
-"""Hold a building as it is searched: block by block, so that a block costs what it holds."""
+"""Hold what the roof of a building is fitted to: points, outline, directions and settings."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import numpy as np
 import shapely
 
 from ...settings import CompoundSettings
+from ..candidates.allowed import list_allowed_shapes
 from ..prices import compute_unit
-from .allowed import list_allowed_shapes
 from .depth import DepthRaster, make_depth_raster
 from .directions import find_directions
 from .plan import Plan
 
-DEAD_M = 0.03  # Residual (m) that costs nothing in the search.
+DEAD_M = 0.03  # Residual (m) that costs nothing where candidates are found.
 LEAST_RAMP_M = 0.02  # Least difference (m) over which larger residuals grow to the cost of a point.
 
 
@@ -81,7 +81,7 @@ def lay_out_whole(
     settings: CompoundSettings,
     types: tuple[str, ...] = (),
 ) -> Whole:
-    """Lay out a building for the search. `settings` are those of [compound].
+    """Lay out a building. `settings` are those of [compound].
 
     Volumes have only shapes that parts of `types` need, any without types.
     """

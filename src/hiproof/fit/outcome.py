@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import shapely
 
-from ...model import Part
+from ..model import Part
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,7 @@
-"""Describe a box of a building as the search sees it.
+"""Describe a box of a building as candidates are found in it.
 
 A scene holds a bounded number of the box's points, spread over all heights, in each of the
-building's directions, and grid lines and unobserved cells of its own. Steps along its border cost
-nothing.
+building's directions, and grid lines and unobserved cells of its own.
 """
 
 from __future__ import annotations
@@ -20,12 +19,11 @@ from .plan import (
     GRID_CELL_SPACINGS,
     HEIGHT_MARGIN_M,
     MIN_STRUCTURE_POINTS,
+    Cloud,
     find_cells,
     lay_cells,
     lay_lines,
 )
-from .planes import Cloud
-from .volumes import DIRECTION, U0
 from .whole import DEAD_M, Box, Whole, clip_to_box
 
 LEAST_CELLS = 22  # As many cells a side a scene may have, and more where it has many points.
@@ -37,19 +35,18 @@ WALL_M = 2.0  # Shortest length (m) of such a wall.
 
 Scene = namedtuple(
     "Scene",
-    "U V order z weight shade n low high turn lines vertices leans unit dead width allowed",
+    "U V z weight shade n low high turn lines leans unit dead width allowed",
 )
-"""A box of a building as the search sees it.
+"""A box of a building as candidates are found in it.
 
 - U, V (directions, n + g): the points, then the unobserved cells.
-- order (directions, 2, n + g): their numbers, ascending along each axis.
 - z, weight (n + g,): the points' heights, and the points that a place stands for.
 - shade (n + g,): the price of the highest of roofs over an unobserved cell without points around
   it, for walls hide only what is lower.
 - n: the number of points.
 - low, high: the heights that a roof may have over an unobserved cell.
 - turn (directions, 2): cosine and sine of each direction from the first.
-- lines, vertices: places for an edge, by direction and axis, padded with infinity.
+- lines: places for an edge, by direction and axis, padded with infinity.
 - leans (directions, 2, m): of walls not quite along an axis, x = offset + lean y, padded.
 - unit: the points that a unit of structure must explain.
 - dead, width: a point costs min((max(|dz| - dead, 0) / width)^2, 1).
@@ -78,7 +75,6 @@ def open_window(whole: Whole, box: Box, most_points: int) -> Scene | None:
     return Scene(
         U,
         V,
-        np.argsort(np.stack([U, V], axis=1), axis=2, kind="stable"),
         np.r_[z, np.zeros(cells.shape[1])],
         np.r_[np.ones(n), cells[2]],
         np.r_[np.zeros(n), cells[3]],
@@ -87,7 +83,6 @@ def open_window(whole: Whole, box: Box, most_points: int) -> Scene | None:
         float(z.max()) + HEIGHT_MARGIN_M,
         whole.turn,
         pad_rows(lines),
-        list_vertices(corners),
         list_leans(corners),
         whole.compute_unit(n / len(numbers)),
         DEAD_M,
@@ -109,11 +104,6 @@ def lay_unobserved_cells(
     i, j = find_cells(u_lines, uvz[0]), find_cells(v_lines, uvz[1])
     cells = lay_cells(Cloud(uvz[0], uvz[1], uvz[2], i, j), u_lines, v_lines, density)
     return cells[:, whole.raster.measure(cells[0], cells[1]) > 0.0]
-
-
-def list_vertices(corners: np.ndarray) -> np.ndarray:
-    """Return the lines (directions, 2, m) through corners, ascending, padded with infinity."""
-    return pad_rows([sorted(set(x)) for ring_corners in corners for x in ring_corners.T.tolist()])
 
 
 def list_leans(corners: np.ndarray) -> np.ndarray:
@@ -142,17 +132,3 @@ def pad_rows(rows: Sequence[Sequence[float] | np.ndarray]) -> np.ndarray:
     for row, values in zip(filled, rows, strict=True):
         row[: len(values)] = values
     return filled.reshape(len(rows) // 2, 2, -1)
-
-
-def end_at_border(whole: Whole, rows: np.ndarray, box: Box) -> np.ndarray:
-    """Let volumes of the first direction end where a window does.
-
-    They do not where the window ends at the outline.
-    """
-    is_aligned, border = rows[:, DIRECTION] == 0, whole.box
-    for side in range(4):
-        if abs(box[side] - border[side]) < HEIGHT_MARGIN_M:
-            continue
-        limit = np.maximum if side % 2 == 0 else np.minimum
-        rows[is_aligned, U0 + side] = limit(rows[is_aligned, U0 + side], box[side])
-    return rows

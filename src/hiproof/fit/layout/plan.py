@@ -7,6 +7,7 @@ cells.
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -19,7 +20,6 @@ from ...geometry.point_in_polygon import flips
 from ...geometry.rings import ring_edges
 from ..direction import main_direction
 from ..walls import on_walls
-from .planes import Cloud
 
 # With fewer points, a building is one level block at their median, and a window shows nothing.
 MIN_STRUCTURE_POINTS = 4
@@ -37,6 +37,8 @@ GRID_CELL_M = 0.5  # Size (m) of a cell.
 GRID_CELL_SPACINGS = 0.6  # Size of a cell in spacings of points, where these are larger.
 HEIGHT_MARGIN_M = 0.3  # Distance (m) beyond the range of heights that an unobserved roof may have.
 SHADE = 0.2  # Price (points) of the highest of roofs for each missing point.
+
+Cloud = namedtuple("Cloud", "u v z i j")  # Points (n,) and the grid cell of each.
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Cut a large roof into blocks that are each searched as a house.
+"""Cut a large roof into blocks that each grow as a house.
 
 Cuts follow steps and narrow places. A cut costs the length over which the roof continues across it,
 and more the less it halves the roof.
@@ -7,10 +7,15 @@ and more the less it halves the roof.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
+import shapely
 
-from .whole import Box, Whole
+from ...geometry.point_in_polygon import find_inside
+from ..shapes.regions import list_polygons
+from .depth import make_depth_raster
+from .whole import Box, Whole, clip_to_box
 
 # Largest area of outline in a block (m2). Blocks of 400 m2 cut saw-tooth halls through their teeth
 # (17 of 20 right at 5 points/m2, all with 600), and Vienna has 81.8 % of its edges instead of 83.2.
@@ -24,6 +29,59 @@ FIXED_M = 1.0  # Price (m) of each cut besides.
 LEAST_HALF_SHARE = 0.25  # Least share of a box's roof on either side of a cut.
 UNEVEN = 2.0  # Factor of the price of a cut that does not halve the roof.
 FEWEST_CUT_CELLS = 8  # A box with fewer cells along an axis is not cut.
+LEAST_HALF_M2 = 1.0  # Least area (m2) of outline on either side of a cut.
+
+
+def split_into_blocks(whole: Whole) -> list[Whole]:
+    """Split a building into blocks, each as if it were a building: one if it is small enough."""
+    outlines = split_outline(whole, HeightRaster(whole), whole.box, whole.outline.area)
+    if len(outlines) == 1:
+        return [whole]
+    blocks = [cut_out(whole, outline) for outline in outlines]
+    return [block for block in blocks if block.plan.uvz.shape[1] > 0]
+
+
+def split_outline(
+    whole: Whole, raster: HeightRaster, box: Box, area_m2: float
+) -> list[shapely.Polygon]:
+    """Return the outlines of the blocks of a box that holds so much of the outline."""
+    cut = find_cheapest_cut(raster, box) if area_m2 > BLOCK_M2 else None
+    halves = box.split(cut[0], find_step(whole, box, *cut, raster.pitch)) if cut else (box, box)
+    areas = [clip_to_box(whole.outline, half).area for half in halves]
+    if cut is None or min(areas) < LEAST_HALF_M2:
+        return list_polygons(clip_to_box(whole.outline, box))
+    return [
+        outline
+        for half, area in zip(halves, areas, strict=True)
+        for outline in split_outline(whole, raster, half, area)
+    ]
+
+
+def cut_out(whole: Whole, outline: shapely.Polygon) -> Whole:
+    """Return what lies in an `outline`, a part of a building's."""
+    plan = whole.plan
+    points, border = (xyz[:, find_inside(outline, *xyz[:2])] for xyz in (plan.uvz, plan.border))
+    part = replace(plan, uvz=points, border=border)
+    return replace(whole, plan=part, outline=outline, raster=make_depth_raster(outline))
+
+
+def find_step(whole: Whole, box: Box, axis: int, place: float, pitch: float) -> float:
+    """Return where within two cells of a cut, at a `place` of an axis, heights change most.
+
+    The squares of heights about their means on both sides have the least sum there.
+    """
+    strip = box.split(axis, place + 2 * pitch)[0].split(axis, place - 2 * pitch)[1]
+    numbers = whole.find_points(strip)
+    x, z = whole.plan.uvz[[axis, 2]][:, numbers]
+    order = np.argsort(x, kind="stable")
+    x, z = x[order], z[order]
+    if len(x) < 2:
+        return place
+    before = np.arange(1, len(x))
+    sums = np.cumsum(z)[:-1]
+    spread = sums**2 / before + (z.sum() - sums) ** 2 / (len(x) - before)
+    q = int(np.argmax(spread))
+    return float(0.5 * (x[q] + x[q + 1]))
 
 
 class HeightRaster:

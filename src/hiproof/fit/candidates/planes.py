@@ -28,7 +28,6 @@ PAIRS_A_SEED = 2  # Pairs of a seed and a point near it whose planes are tried.
 MOST_GABLES = 6  # Most gables of a pool: a limit on time.
 TEMPLATE_POINTS = 150  # Points that templates are fitted to: few are enough for a start.
 
-Cloud = namedtuple("Cloud", "u v z i j")  # Points (n,) and the grid cell of each.
 Grid = namedtuple("Grid", "u v")  # Grid lines, ascending.
 
 
