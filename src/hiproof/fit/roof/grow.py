@@ -33,6 +33,7 @@ def find_roof(whole: Whole, keeps_shapes: bool) -> Draft:
     else:
         roofs = [draw_in_all(grow(block, keeps_shapes)).roof for block in blocks]
         draft = make_draft(join_roofs(roofs), site)
+    draw_in_all(draft)  # narrow strips cost then what they are seen to lack
     draft.fit()
     draft.improve()
     if whole.plan.uvz.shape[1] > count_search_points(whole.outline.area):  # else all were seen
