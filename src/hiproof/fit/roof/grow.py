@@ -27,13 +27,12 @@ LARGEST_HOUSE_M2 = 200.0  # Area (m2) of the largest house.
 
 def find_roof(whole: Whole, keeps_shapes: bool) -> Draft:
     """Find a roof that no move makes cheaper. Its hidden sides are drawn in."""
-    site, blocks = make_site(whole, keeps_shapes), split_into_blocks(whole)
-    if len(blocks) == 1:
-        draft = grow(whole, keeps_shapes)
-    else:
-        roofs = [draw_in_all(grow(block, keeps_shapes)).roof for block in blocks]
-        draft = make_draft(join_roofs(roofs), site)
-    draw_in_all(draft)  # narrow strips cost then what they are seen to lack
+    drafts = [draw_in_all(grow(block, keeps_shapes)) for block in split_into_blocks(whole)]
+    draft = drafts[0]
+    if len(drafts) > 1:
+        roof = join_roofs([block.roof for block in drafts])
+        draft = make_draft(roof, make_site(whole, keeps_shapes))
+    # Narrow strips cost from now on what they are seen to lack.
     draft.fit()
     draft.improve()
     if whole.plan.uvz.shape[1] > count_search_points(whole.outline.area):  # else all were seen
