@@ -24,7 +24,7 @@ from hiproof.fit.roof.draw import (
 )
 from hiproof.fit.roof.grow import grow, regrow
 from hiproof.fit.roof.moves import ALL_MOVES, LEAVE_OUT, MOVE_COLUMNS, list_moves
-from hiproof.fit.roof.price import know, price_roof
+from hiproof.fit.roof.price import know, price_known
 from hiproof.fit.roof.regions import split_region
 from hiproof.fit.roof.site import make_site, split_convex
 from hiproof.fit.roof.start import start_roof
@@ -80,7 +80,7 @@ def add_copy(roof):
 
 
 def price(roof, site):
-    return price_roof(roof, make_drawing(len(roof.sides)), site)
+    return price_known(know(roof, make_drawing(len(roof.sides)), site), site)
 
 
 def try_exactly(roof, trial, move, site):

@@ -333,12 +333,6 @@ def price_known(known, site):
 
 
 @compiled
-def price_roof(roof, drawing, site):
-    """Return the price (points) of a roof."""
-    return price_known(know(roof, drawing, site), site)
-
-
-@compiled
 def sum_normal_equations(roof, site, view, points, places, matrix, vector):
     """Sum the normal equations of unknowns over the points that a roof explains.
 
