@@ -177,12 +177,10 @@ def test_the_best_candidate_has_the_best_of_all_rectangles(seed, replacing):
     rng, volumes, scene = draw_case(seed)
     candidates = np.array([draw_volume(rng, 0.0) for _ in range(6)])
     cell_u, cell_v = rng.integers(0, 6, (2, *scene.U.shape))
-    scene = scene._replace(lines=np.tile(np.arange(7.0), (2, 2, 1)))
+    scene = scene._replace(lines=np.tile(np.arange(7.0), (2, 2, 1)), cell_u=cell_u, cell_v=cell_v)
     z_now, _ = compute_heights(volumes, scene.U, scene.V)
     cost_now = compute_costs(z_now, scene)
-    gains, cells = find_best_rectangles(
-        scene, candidates, cell_u, cell_v, cost_now, z_now, replacing
-    )
+    gains, cells = find_best_rectangles(scene, candidates, cost_now, z_now, replacing)
     brute, result = np.empty(6), np.empty(6)
     for m, (i0, i1, j0, j1) in enumerate(cells):
         gain = np.zeros((6, 6))

@@ -1,4 +1,4 @@
-"""Whether a point lies in rings: the even-odd rule, edge by edge. Compiled."""
+"""Whether a point lies in rings, and how near: the even-odd rule, edge by edge. Compiled."""
 
 from __future__ import annotations
 
@@ -19,6 +19,20 @@ def flips(x0, y0, x1, y1, x, y):
     turn = (x - x0) * (y1 - y0) - (y - y0) * (x1 - x0)
     is_left = ((turn < 0.0) & (y1 > y0)) | ((turn > 0.0) & (y1 < y0))
     return ((y0 > y) != (y1 > y)) & is_left
+
+
+@compiled
+def update_nearest(x0, y0, x1, y1, x, y, squared, inside):
+    """Update how near edges are, `squared` (n,), and what lies `inside` (n,), for one edge more.
+
+    It runs from (x0, y0) to (x1, y1), beside places x, y (n,).
+    """
+    dx, dy = x1 - x0, y1 - y0
+    length = max(dx * dx + dy * dy, 1e-18)
+    for k in range(len(x)):
+        inside[k] ^= flips(x0, y0, x1, y1, x[k], y[k])
+        t = min(max(((x[k] - x0) * dx + (y[k] - y0) * dy) / length, 0.0), 1.0)
+        squared[k] = min(squared[k], (x0 + t * dx - x[k]) ** 2 + (y0 + t * dy - y[k]) ** 2)
 
 
 def find_inside(area: shapely.Geometry, x: np.ndarray, y: np.ndarray) -> np.ndarray:

@@ -106,14 +106,15 @@ def compile_half(half: str) -> None:
     for xyz, polygon in ((points, outline), (make_hall(), HALL)):
         plan = lay_out_plan(xyz, polygon)
         wholes.append(lay_out_whole(plan, polygon, settings.compound))
+    site = make_site(wholes[0])
     if half == "roof":
-        draft = make_draft(start_roof(wholes[0], make_site(wholes[0])), make_site(wholes[0]))
+        draft = make_draft(start_roof(wholes[0], site), site)
         draft.improve()
         parts = read_parts(draft.roof, draft.site, wholes[0].outline, wholes[0].plan, ())
         fit_shapes(parts, points, outline, settings)
         return
     if (scene := open_window(wholes[0], wholes[0].box, len(points))) is not None:
-        list(list_volumes(start_roof(wholes[0], make_site(wholes[0])), scene))
+        list(list_volumes(start_roof(wholes[0], site), scene))
     PointGrid(points).inside(outline)
     network = "auto" if find_spec("onnxruntime") else "never"
     one = Settings().replace({"fit": {"parts": "one"}, "segment": {"network": network}})

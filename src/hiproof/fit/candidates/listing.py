@@ -9,7 +9,7 @@ import numpy as np
 
 from ...compiled import compiled
 from ...geometry.arrays import copy_row, copy_rows, sort_values
-from ..layout.plan import Cloud, find_cells
+from ..layout.plan import Cloud
 from ..layout.scene import Scene
 from ..misfit import compute_cell_cost, compute_point_cost
 from .planes import (
@@ -49,43 +49,23 @@ SAME_SLOPE = 1e-6  # Slopes (rise over run) and leans that differ less are numer
 WRONG_COVER = 0.02  # Price (points) of covering a point without explaining it.
 # Most planes that are found among the points that a roof leaves unexplained. What explains less
 # stays unseen.
-MOST_NEW_PLANES = 10
+MOST_PLANES = 10
 # Least points among which candidates are found, and around which planes are fitted: limits on time.
 # Of many points they are three in four, and one in eight.
 LEAST_POOL, LEAST_SEEDS = 500, 100
 
 
-def list_candidates(scene: Scene, members: np.ndarray, most_planes: int) -> np.ndarray:
+def list_candidates(scene: Scene, members: np.ndarray) -> np.ndarray:
     """List volumes (m, COLUMNS) without rectangles that points suggest.
 
     They have allowed shapes, in every direction. The points are `members` (k,).
     """
-    grids = enumerate(make_grids(scene))
     return np.concatenate(
-        [
-            list_candidates_along(scene, members, direction, grid, most_planes)
-            for direction, grid in grids
-        ]
+        [list_candidates_along(scene, members, direction) for direction in range(len(scene.turn))]
     )
 
 
-def make_grids(scene: Scene) -> list[Grid]:
-    """Return the cells between the scene's lines, for each direction."""
-    return [Grid(*(axis[np.isfinite(axis)] for axis in lines)) for lines in scene.lines]
-
-
-def locate(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
-    """Return the cells (directions, n + g) along u and along v of a scene's points and cells."""
-    grids = make_grids(scene)
-    return (
-        np.array([find_cells(grid.u, u) for grid, u in zip(grids, scene.U, strict=True)]),
-        np.array([find_cells(grid.v, v) for grid, v in zip(grids, scene.V, strict=True)]),
-    )
-
-
-def list_candidates_along(
-    scene: Scene, members: np.ndarray, direction: int, grid: Grid, most_planes: int
-) -> np.ndarray:
+def list_candidates_along(scene: Scene, members: np.ndarray, direction: int) -> np.ndarray:
     """List the candidates (m, COLUMNS) in one direction.
 
     They are made of every plane of the pool, turned along an axis if necessary, of gables, of all
@@ -93,10 +73,10 @@ def list_candidates_along(
     """
     count = min(len(members), max(LEAST_POOL, 3 * scene.n // 4))
     numbers = members[np.arange(count) * len(members) // count]
-    u, v, z = (
-        np.ascontiguousarray(x[numbers]) for x in (scene.U[direction], scene.V[direction], scene.z)
-    )
-    cloud = Cloud(u, v, z, find_cells(grid.u, u), find_cells(grid.v, v))
+    grid = Grid(*(axis[np.isfinite(axis)] for axis in scene.lines[direction]))
+    places = (scene.U, scene.V, scene.cell_u, scene.cell_v)
+    u, v, i, j = (x[direction][numbers] for x in places)
+    cloud = Cloud(u, v, scene.z[numbers], i, j)
     unit, tolerance = scene.unit * len(numbers) / len(members), scene.dead + scene.width
     pool = pool_planes(
         cloud,
@@ -104,7 +84,7 @@ def list_candidates_along(
         list_hypotheses(cloud, max(LEAST_SEEDS, scene.n // 8)),
         tolerance,
         unit,
-        most_planes,
+        MOST_PLANES,
     )
     if len(pool) == 0:
         return np.empty((0, COLUMNS))
@@ -302,13 +282,12 @@ def count_cells(lines):
 
 
 @compiled
-def find_best_rectangles(scene, candidates, cell_u, cell_v, cost_now, z_now, replacing):
+def find_best_rectangles(scene, candidates, cost_now, z_now, replacing):
     """Find, for each candidate, the rectangle of cells (m, 4) in which it gains most.
 
-    Also returns that gain (m,) less the candidate's price. `cell_u`, `cell_v` (directions, n + g)
-    are the cells of points and unobserved cells between the scene's lines. A candidate counts where
-    it is above the roof `z_now`, and everywhere if it is `replacing`. Candidates that cannot come
-    near the best are left out (minus infinity).
+    Also returns that gain (m,) less the candidate's price. A candidate counts where it is above the
+    roof `z_now`, and everywhere if it is `replacing`. Candidates that cannot come near the best are
+    left out (minus infinity).
     """
     gains, rectangles = np.full(len(candidates), -np.inf), np.zeros((len(candidates), 4), np.int64)
     floor, gain = (
@@ -328,7 +307,7 @@ def find_best_rectangles(scene, candidates, cell_u, cell_v, cost_now, z_now, rep
         nu, nv = count_cells(scene.lines[direction, 0]), count_cells(scene.lines[direction, 1])
         cells, reach, column = np.zeros((nu, nv)), np.empty(nu + 1), np.empty(nv)
         for i in range(len(gain)):
-            cells[cell_u[direction, i], cell_v[direction, i]] += gain[i]
+            cells[scene.cell_u[direction, i], scene.cell_v[direction, i]] += gain[i]
         bound_rows(cells, reach)
         if reach[0] <= least_gain:
             continue

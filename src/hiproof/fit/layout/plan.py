@@ -16,7 +16,7 @@ import shapely
 
 from ...compiled import compiled
 from ...frames import PlanFrame
-from ...geometry.point_in_polygon import flips
+from ...geometry.point_in_polygon import update_nearest
 from ...geometry.rings import ring_edges
 from ..direction import main_direction
 from ..walls import on_walls
@@ -66,13 +66,7 @@ def measure_depth(x, y, starts, ends):
     inside, nearest = np.zeros(len(x), np.bool_), np.full(len(x), np.inf)
     # Edges follow each other, so that the processor computes several points at once.
     for e in range(len(starts)):
-        x0, y0, x1, y1 = starts[e, 0], starts[e, 1], ends[e, 0], ends[e, 1]
-        dx, dy = x1 - x0, y1 - y0
-        square = max(dx * dx + dy * dy, 1e-18)
-        for i in range(len(x)):
-            inside[i] ^= flips(x0, y0, x1, y1, x[i], y[i])
-            t = min(max(((x[i] - x0) * dx + (y[i] - y0) * dy) / square, 0.0), 1.0)
-            nearest[i] = min(nearest[i], (x0 + t * dx - x[i]) ** 2 + (y0 + t * dy - y[i]) ** 2)
+        update_nearest(starts[e, 0], starts[e, 1], ends[e, 0], ends[e, 1], x, y, nearest, inside)
     for i in range(len(x)):
         nearest[i] = np.sqrt(nearest[i]) if inside[i] else -np.sqrt(nearest[i])
     return nearest

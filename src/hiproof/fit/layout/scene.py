@@ -35,7 +35,7 @@ WALL_M = 2.0  # Shortest length (m) of such a wall.
 
 Scene = namedtuple(
     "Scene",
-    "U V z weight shade n low high turn lines leans unit dead width allowed",
+    "U V z weight shade n low high turn lines cell_u cell_v leans unit dead width allowed",
 )
 """A box of a building as candidates are found in it.
 
@@ -47,6 +47,7 @@ Scene = namedtuple(
 - low, high: the heights that a roof may have over an unobserved cell.
 - turn (directions, 2): cosine and sine of each direction from the first.
 - lines: places for an edge, by direction and axis, padded with infinity.
+- cell_u, cell_v (directions, n + g): the cells between these in which points and cells lie.
 - leans (directions, 2, m): of walls not quite along an axis, x = offset + lean y, padded.
 - unit: the points that a unit of structure must explain.
 - dead, width: a point costs min((max(|dz| - dead, 0) / width)^2, 1).
@@ -83,6 +84,8 @@ def open_window(whole: Whole, box: Box, most_points: int) -> Scene | None:
         float(z.max()) + HEIGHT_MARGIN_M,
         whole.turn,
         pad_rows(lines),
+        np.array([find_cells(axis, u) for axis, u in zip(lines[::2], U, strict=True)]),
+        np.array([find_cells(axis, v) for axis, v in zip(lines[1::2], V, strict=True)]),
         list_leans(corners),
         whole.compute_unit(n / len(numbers)),
         DEAD_M,

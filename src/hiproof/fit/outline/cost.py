@@ -27,7 +27,7 @@ import numpy as np
 
 from ...compiled import compiled
 from ...geometry.arrays import copy_row, find_place
-from ...geometry.point_in_polygon import flips
+from ...geometry.point_in_polygon import update_nearest
 from .lines import SAME_RAD, compute_area, find_corners, quarter_gap
 from .soft import SURE_BLURS, share_inside
 
@@ -132,17 +132,6 @@ def nearest_sides(corners, x, y, court, reach):
             nearby = slice(find_place(y, lower), find_place(y, upper))
             update_nearest(x0, y0, x1, y1, x[nearby], y[nearby], squared[nearby], inside[nearby])
     return squared, inside
-
-
-@compiled
-def update_nearest(x0, y0, x1, y1, x, y, squared, inside):
-    """Update the answer of `nearest_sides` for one side more."""
-    dx, dy = x1 - x0, y1 - y0
-    length = max(dx * dx + dy * dy, 1e-18)
-    for k in range(len(x)):
-        inside[k] ^= flips(x0, y0, x1, y1, x[k], y[k])
-        t = min(max(((x[k] - x0) * dx + (y[k] - y0) * dy) / length, 0.0), 1.0)
-        squared[k] = min(squared[k], (x0 + t * dx - x[k]) ** 2 + (y0 + t * dy - y[k]) ** 2)
 
 
 @compiled

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..candidates.listing import MOST_NEW_PLANES, find_best_rectangles, list_candidates, locate
+from ..candidates.listing import find_best_rectangles, list_candidates
 from ..candidates.volumes import DIRECTION, REPLACES, U0
 from ..layout.scene import Scene, open_window
 from ..layout.whole import Box, Whole
@@ -117,9 +117,9 @@ def list_volumes(roof: Tables, scene: Scene) -> Iterator[np.ndarray]:
     unexplained = np.flatnonzero(costs[: scene.n] > UNEXPLAINED)
     if len(unexplained) < FEWEST_UNEXPLAINED:
         return
-    candidates, cells = list_candidates(scene, unexplained, MOST_NEW_PLANES), locate(scene)
+    candidates = list_candidates(scene, unexplained)
     for replaces in (False, True):
-        gains, rectangles = find_best_rectangles(scene, candidates, *cells, costs, z, replaces)
+        gains, rectangles = find_best_rectangles(scene, candidates, costs, z, replaces)
         candidates[:, REPLACES] = replaces
         for m in np.argsort(-gains, kind="stable")[:TRIED].tolist():
             if gains[m] > 0.0:

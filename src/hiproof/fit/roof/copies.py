@@ -8,7 +8,15 @@ from ...compiled import compiled
 from ..misfit import compute_point_cost
 from .draw import is_near
 from .price import compute_costs, list_points
-from .tables import N_SIDES, VOLUME_COUNT, add_line, find_lowest_plane, place_volume, read_line
+from .tables import (
+    N_SIDES,
+    VOLUME_COUNT,
+    add_line,
+    copy_volume,
+    find_lowest_plane,
+    place_volume,
+    read_line,
+)
 
 MOST_COPIED_M = 8.0  # Size (m) of the largest volume that is copied.
 REACH_M = 20.0  # Farthest (m) that it is.
@@ -66,13 +74,12 @@ def add_copy(roof, k, x, y):
     """Add volume k once more, with its heights and slopes, x and y (m) away. Returns its number."""
     copy = roof.counts[VOLUME_COUNT]
     roof.counts[VOLUME_COUNT] = copy + 1
+    copy_volume(roof, k, copy)
     for s in range(N_SIDES):
         a, b, c = read_line(roof, roof.sides[k, s])
         roof.sides[copy, s] = add_line(roof, a, b, c - a * x - b * y)
     for p in range(roof.n_planes[k]):
         a, b, c = read_line(roof, roof.plane_lines[k, p])
         roof.plane_lines[copy, p] = add_line(roof, a, b, c - a * x - b * y)
-    roof.n_planes[copy], roof.replaces[copy] = roof.n_planes[k], roof.replaces[k]
-    roof.heights[copy], roof.slopes[copy] = roof.heights[k], roof.slopes[k]
     place_volume(roof, copy)
     return copy

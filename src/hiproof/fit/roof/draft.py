@@ -54,7 +54,5 @@ class Draft:
 def make_draft(roof: Tables, site: Site) -> Draft:
     """Return a draft of a roof, fitted to all points."""
     drawing = make_drawing(len(roof.sides))
-    known = know(roof, drawing, site)
-    draft = Draft(roof, site, known, make_tables_like(roof), drawing)
-    draft.fit()
-    return draft
+    fit_roof(roof, site, FIT_ROUNDS)
+    return Draft(roof, site, know(roof, drawing, site), make_tables_like(roof), drawing)

@@ -20,6 +20,7 @@ BIN_M = 0.02  # Width (m) of a bin of points.
 LEANS = 12  # Ways to lean to either side.
 PAIRS = 24  # Pairs of points through which a plane is tried.
 LEAST_RUN_M = 0.4  # Least distance (m) between the points of a pair, across the side.
+NO_SIDE = -1  # Of points that lie inside of all sides.
 LEAN_STEP = 0.02  # Steps (rise over run) in which a line leans.
 
 
@@ -89,52 +90,49 @@ def list_near(roof, k, s, x, y, site):
     Returns their distances from the side and along it from x, y, whether they lie on the volume,
     and that each of them stands for so many.
     """
-    box, half = roof.boxes[k], roof.half_planes[k, s]
-    first = np.searchsorted(site.x[: site.n], box[0] - REACH_M)
-    last = np.searchsorted(site.x[: site.n], box[1] + REACH_M)
+    numbers, half = list_between(roof, k, s, REACH_M, site), roof.half_planes[k, s]
+    step = 1 + max(len(numbers) - 1, 0) // MOST
+    numbers = numbers[::step]
+    along = half[1] * (site.x[numbers] - x) - half[0] * (site.y[numbers] - y)
+    is_on = np.abs(measure_gaps(roof, k, site, numbers)) < site.dead + site.width
+    return measure_from(roof, k, s, site, numbers), along, is_on, step
+
+
+@compiled
+def list_between(roof, k, s, reach, site):
+    """List the points inside the sides of volume k, and those so near (m) side s, if it has one."""
+    box = roof.boxes[k]
+    first = np.searchsorted(site.x[: site.n], box[0] - reach)
+    last = np.searchsorted(site.x[: site.n], box[1] + reach)
     numbers, count = np.empty(last - first, np.int64), 0
     for i in range(first, last):
-        u, v = site.x[i], site.y[i]
-        is_near = abs(half[0] * u + half[1] * v + half[2]) < REACH_M
+        is_inside = True
         for t in range(N_SIDES):
-            if t != s:
-                other = roof.half_planes[k, t]
-                is_near &= other[0] * u + other[1] * v + other[2] >= 0.0
-        if is_near:
+            half = roof.half_planes[k, t]
+            distance = half[0] * site.x[i] + half[1] * site.y[i] + half[2]
+            is_inside &= abs(distance) < reach if t == s else distance >= 0.0
+        if is_inside:
             numbers[count] = i
             count += 1
-    step = 1 + max(count - 1, 0) // MOST
-    numbers = numbers[:count:step]
-    across, along = np.empty(len(numbers)), np.empty(len(numbers))
-    is_on = np.zeros(len(numbers), np.bool_)
+    return numbers[:count]
+
+
+@compiled
+def measure_gaps(roof, k, site, numbers):
+    """Return how far (m) points of such `numbers` (n,) lie above the planes of volume k."""
+    gaps = np.empty(len(numbers))
     for m in range(len(numbers)):
-        u, v = site.x[numbers[m]], site.y[numbers[m]]
-        across[m] = half[0] * u + half[1] * v + half[2]
-        along[m] = half[1] * (u - x) - half[0] * (v - y)
-        lowest = np.inf
-        for p in range(roof.n_planes[k]):
-            row = roof.planes[k, p]
-            lowest = min(lowest, row[0] * u + row[1] * v + row[2])
-        is_on[m] = abs(site.z[numbers[m]] - lowest) < site.dead + site.width
-    return across, along, is_on, step
+        i = numbers[m]
+        lowest, _ = find_lowest_plane(roof, k, site.x[i], site.y[i])
+        gaps[m] = site.z[i] - lowest
+    return gaps
 
 
 @compiled
 def list_inside(roof, k, site):
     """List the points inside the sides of volume k, and how far (m) each lies above its planes."""
-    box = roof.boxes[k]
-    first, last = np.searchsorted(site.x[: site.n], box[:2])
-    numbers, gaps, count = np.empty(last - first, np.int64), np.empty(last - first), 0
-    for i in range(first, last):
-        u, v, is_inside = site.x[i], site.y[i], True
-        for s in range(N_SIDES):
-            half = roof.half_planes[k, s]
-            is_inside &= half[0] * u + half[1] * v + half[2] >= 0.0
-        if is_inside:
-            lowest, _ = find_lowest_plane(roof, k, u, v)
-            numbers[count], gaps[count] = i, site.z[i] - lowest
-            count += 1
-    return numbers[:count], gaps[:count]
+    numbers = list_between(roof, k, NO_SIDE, 0.0, site)
+    return numbers, measure_gaps(roof, k, site, numbers)
 
 
 @compiled

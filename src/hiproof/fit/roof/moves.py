@@ -23,6 +23,7 @@ from .tables import (
     add_line,
     add_plane,
     add_unknown,
+    copy_volume,
     cross_lines,
     drop_plane,
     find_lowest_plane,
@@ -457,11 +458,9 @@ def split(roof, k, s, site, changed):
     a, b, c = read_line(roof, roof.sides[k, s])
     line, new = add_line(roof, a, b, c - place), roof.counts[VOLUME_COUNT]
     roof.counts[VOLUME_COUNT] = new + 1
-    roof.sides[new], roof.n_planes[new] = roof.sides[k], roof.n_planes[k]
-    roof.plane_lines[new], roof.slopes[new] = roof.plane_lines[k], roof.slopes[k]
-    roof.replaces[new], changed[new] = roof.replaces[k], True
+    copy_volume(roof, k, new)
+    changed[new] = True
     roof.sides[new, s], roof.sides[k, s ^ 1] = line, -line
-    roof.heights[new] = roof.heights[k]
     for p in range(roof.n_planes[k]):
         height = roof.heights[k, p]
         if roof.heights[new, p] == height:  # else it is that of a plane before

@@ -233,10 +233,18 @@ def is_double(roof, k, p):
     """Return whether plane p of volume k is another of its planes, too."""
     for q in range(roof.n_planes[k]):
         is_same = q != p and roof.plane_lines[k, q] == roof.plane_lines[k, p]
-        if is_same and roof.heights[k, q] == roof.heights[k, p]:
-            if roof.slopes[k, q] == roof.slopes[k, p]:
-                return True
+        is_same &= roof.heights[k, q] == roof.heights[k, p]
+        if is_same and roof.slopes[k, q] == roof.slopes[k, p]:
+            return True
     return False
+
+
+@compiled
+def copy_volume(roof, k, place):
+    """Let the volume at a place be as volume k, on the same lines and of the same unknowns."""
+    roof.sides[place], roof.n_planes[place] = roof.sides[k], roof.n_planes[k]
+    roof.plane_lines[place], roof.heights[place] = roof.plane_lines[k], roof.heights[k]
+    roof.slopes[place], roof.replaces[place] = roof.slopes[k], roof.replaces[k]
 
 
 @compiled
@@ -249,10 +257,7 @@ def pack(roof):
                 drop_plane(roof, k, p)
         if roof.n_planes[k] == 0:
             continue
-        if place < k:
-            roof.sides[place], roof.n_planes[place] = roof.sides[k], roof.n_planes[k]
-            roof.plane_lines[place], roof.heights[place] = roof.plane_lines[k], roof.heights[k]
-            roof.slopes[place], roof.replaces[place] = roof.slopes[k], roof.replaces[k]
+        copy_volume(roof, k, place)
         place += 1
     roof.counts[VOLUME_COUNT] = place
     new_line, new_unknown = np.full(len(roof.lines), -1), np.full(len(roof.values), -1)
