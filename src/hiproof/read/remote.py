@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -14,9 +12,10 @@ from ..masking import remember
 
 BLOCK_BYTES = 1 << 20  # bytes a request; a server's answer takes longer than a megabyte's way
 SILENCE_S = 60.0  # s that a server may be silent; fsspec waits for five minutes in all
+FilePath = str | Path  # of this machine, or an address
 
 
-def is_url(path: str | Path) -> bool:
+def is_url(path: FilePath) -> bool:
     """Return whether `path` is an address rather than a file of this machine.
 
     >>> is_url("https://example.org/tile.laz"), is_url("tiles/a.laz")
@@ -25,28 +24,20 @@ def is_url(path: str | Path) -> bool:
     return "://" in str(path)
 
 
-def locate(path: str | Path) -> str:
+def locate(path: FilePath) -> str:
     """Return an address as it is, and of a file the place to which all links to it lead."""
     return str(path) if is_url(path) else str(Path(path).resolve())
 
 
-@contextmanager
-def open_binary(
-    path: str | Path, expected: str = "a point cloud", **reading: Any
-) -> Iterator[BinaryIO]:
+def open_binary(path: FilePath, expected: str = "a point cloud", **reading: Any) -> BinaryIO:
     """Open a seekable binary file at a path or an address.
 
     `reading` are options of fsspec's files. Raises InputError, which says what was `expected`,
     where an address cannot be opened.
     """
-    with (
-        open_address(str(path), expected, **reading) if is_url(path) else Path(path).open("rb")
-    ) as file:
-        yield file
-
-
-def open_address(url: str, expected: str = "a point cloud", **reading: Any) -> BinaryIO:
-    fsspec = import_fsspec()
+    if not is_url(path):
+        return Path(path).open("rb")
+    url, fsspec = str(path), import_fsspec()
     remember(url)
     try:
         # buffered once more: fsspec's own files read lines of any length only

@@ -12,13 +12,13 @@ import csv
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import shapely
 
 from ..errors import InputError, warn
 from ..log import count_things
+from .remote import FilePath
 
 # Our catalogue's name of each RoofN3D class.
 ROOFN3D_TYPES = {"saddleback roof": "gable", "two-sided hip roof": "hip", "pyramid roof": "pyramid"}
@@ -44,7 +44,7 @@ class RoofN3DRecord:
     outline: shapely.Polygon
 
 
-def read_roofn3d(path: str | Path) -> Iterator[RoofN3DRecord]:
+def read_roofn3d(path: FilePath) -> Iterator[RoofN3DRecord]:
     """Yield the buildings of `roofn3d_buildings.csv`, each id once.
 
     The first row of an id counts. One row is in memory at a time. Raises InputError for a file of
@@ -68,7 +68,7 @@ def read_roofn3d(path: str | Path) -> Iterator[RoofN3DRecord]:
 
 
 def read_roofn3d_labels(
-    path: str | Path, records: Iterator[RoofN3DRecord]
+    path: FilePath, records: Iterator[RoofN3DRecord]
 ) -> Iterator[tuple[RoofN3DRecord, np.ndarray]]:
     """Yield each record with its points' labels (n,).
 
@@ -90,7 +90,7 @@ def read_roofn3d_labels(
             yield record, labels
 
 
-def surface_offsets(path: str | Path) -> dict[str, list[int]]:
+def surface_offsets(path: FilePath) -> dict[str, list[int]]:
     """Return where (bytes) each building's rows start: rows are lines without breaks."""
     # refuses another layout before the pass over the whole file
     next(rows(path, ("points", "fk_buildings")), None)
@@ -107,7 +107,7 @@ def surface_offsets(path: str | Path) -> dict[str, list[int]]:
     return offsets
 
 
-def rows(path: str | Path, required: tuple[str, ...]) -> Iterator[tuple[int, dict[str, str]]]:
+def rows(path: FilePath, required: tuple[str, ...]) -> Iterator[tuple[int, dict[str, str]]]:
     """Number rows (the header is 1) with fields by name; InputError without a needed one."""
     csv.field_size_limit(FIELD_LIMIT)
     try:
@@ -132,7 +132,7 @@ def rows(path: str | Path, required: tuple[str, ...]) -> Iterator[tuple[int, dic
 
 
 @contextmanager
-def naming_row(path: str | Path, number: int) -> Iterator[None]:
+def naming_row(path: FilePath, number: int) -> Iterator[None]:
     try:
         yield
     except (ValueError, shapely.errors.ShapelyError) as error:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -31,6 +30,7 @@ from ..crs import (
 from ..crs.operations import find_operation, warn_if_coarse
 from ..crs.positions import format_box, refuse_degrees
 from ..names import READING
+from ..remote import FilePath
 from .attribute_columns import attribute_rows
 from .database import is_database, read_table, table_crs
 from .geoparquet import is_parquet
@@ -45,7 +45,7 @@ ID_NAMES: list[str] = READING["id_names"]
 
 
 def read_footprints(
-    path: str | Path,
+    path: FilePath,
     layer: str | int | None = None,
     id_attribute: str | None = None,
     target_crs: Any = None,
@@ -92,14 +92,14 @@ def meets(polygon: shapely.Polygon, bbox: Box, units: Units) -> bool:
     return bool(shapely.intersects(polygon, shapely.box(*units.to_metres(bbox))))
 
 
-def footprint_crs(path: str | Path, layer: str | int | None = None) -> CRS | None:
+def footprint_crs(path: FilePath, layer: str | int | None = None) -> CRS | None:
     """Return the CRS that a file names, or None; raises InputError as `read_footprints`."""
     if is_database(path):
         return plan_crs(table_crs(str(path)), path)
     return plan_crs(find_reader(path).read_crs(path, layer), path)
 
 
-def find_reader(path: str | Path) -> ModuleType:
+def find_reader(path: FilePath) -> ModuleType:
     """Return the module that reads files of this kind."""
     if is_parquet(path):
         from . import geoparquet
@@ -110,14 +110,14 @@ def find_reader(path: str | Path) -> ModuleType:
     return vector_file
 
 
-def plan_crs(text: str | CRS | None, path: str | Path) -> CRS | None:
+def plan_crs(text: str | CRS | None, path: FilePath) -> CRS | None:
     """Return a vector file's CRS, None without a plan or for GeoPackage's "undefined"."""
     crs = read_named_crs(text, path)
     return None if crs is None or names_heights_alone(crs) or crs.name in UNDEFINED_CRS else crs
 
 
 def read_features(
-    path: str | Path,
+    path: FilePath,
     layer: str | int | None,
     where: str | None = None,
     bbox: Box | None = None,
@@ -146,7 +146,7 @@ def read_features(
 
 
 def refuse_nothing(
-    path: str | Path,
+    path: FilePath,
     count: int,
     bounds: Sequence[float] | None,
     where: str | None,
@@ -177,7 +177,7 @@ def box_in(crs: CRS | None, bbox: Box, bbox_crs: CRS | None) -> Box:
 
 
 def feature_ids(
-    rows: list[dict[str, Any]], numbers: np.ndarray, id_attribute: str | None, path: str | Path
+    rows: list[dict[str, Any]], numbers: np.ndarray, id_attribute: str | None, path: FilePath
 ) -> list[str]:
     """Return features' ids as text: of the requested or a usual attribute, else numbers."""
     by_number = [str(number) for number in numbers]
@@ -224,7 +224,7 @@ def id_text(value: Any) -> str:
 
 
 def transform_geometries(
-    geometries: np.ndarray, source: CRS | None, target: CRS | None, path: str | Path
+    geometries: np.ndarray, source: CRS | None, target: CRS | None, path: FilePath
 ) -> np.ndarray:
     """Transform plan geometries; raises InputError where impossible or without numbers."""
     geometries = shapely.force_2d(geometries)
@@ -282,7 +282,7 @@ def split_features(
     geometries: np.ndarray,
     surfaces: np.ndarray,
     attributes: list[dict[str, Any]],
-    path: str | Path,
+    path: FilePath,
 ) -> list[Footprint]:
     """Make footprints of features, several where polygons stand apart; `surfaces` do not."""
     footprints, mended, empty, split = [], 0, 0, []
@@ -319,7 +319,7 @@ def split_features(
     return footprints
 
 
-def unique_ids(footprints: Sequence[Footprint], path: str | Path) -> list[Footprint]:
+def unique_ids(footprints: Sequence[Footprint], path: FilePath) -> list[Footprint]:
     """Make ids unique by `_2`, `_3`; copies of a polygon name it in `copy_of`."""
     ids = {footprint.id for footprint in footprints}
     in_use: set[str] = set()
@@ -371,7 +371,7 @@ def find_copies(polygons: np.ndarray) -> dict[int, int]:
     )
 
 
-def warn_overlaps(footprints: Sequence[Footprint], path: str | Path) -> None:
+def warn_overlaps(footprints: Sequence[Footprint], path: FilePath) -> None:
     """Warn once of footprints on larger ones, whose models of the same points overlap."""
     polygons = np.array([footprint.polygon for footprint in footprints])
     pairs = shapely.STRtree(polygons).query(shapely.point_on_surface(polygons), predicate="within")

@@ -27,19 +27,19 @@ from pyproj import CRS
 from ...errors import InputError
 from ...extras import import_extra
 from ..crs import read_named_crs
-from ..remote import is_url, open_binary
+from ..remote import FilePath, is_url, open_binary
 from .attribute_columns import plain_value, quote, shortest
 from .polygons import Features, decode_geometries
 
 
-def read_crs(path: str | Path, layer: str | int | None) -> CRS | None:
+def read_crs(path: FilePath, layer: str | int | None) -> CRS | None:
     """Return the CRS that a GeoParquet file names, None where it leaves it open."""
     with open_parquet(path) as file:
         return geometry_column(file, path).crs
 
 
 def read_features(
-    path: str | Path,
+    path: FilePath,
     layer: str | int | None,
     where: str | None,
     box_in: Callable[[CRS | None], tuple[float, ...] | None],
@@ -58,8 +58,7 @@ def read_features(
     with open_parquet(path) as file:
         column = geometry_column(file, path)
         box = box_in(column.crs)
-        boxes = {way[0] for way in column.sides or ()}
-        without = {column.name, *column.others, *boxes}
+        without = {column.name, *column.others, *column.boxes}
         names = [name for name in file.schema_arrow.names if name not in without]
         extent = None if box is None else shapely.box(*box)
         table, numbers = read_rows(file, column, names, extent)
@@ -77,38 +76,35 @@ def convert_values(column: Any) -> np.ndarray:
     import pyarrow
     from pyarrow import types
 
-    values = np.empty(len(column), object)
     if types.is_float32(column.type):
-        values[:] = shortest(np.array(column.to_numpy(), np.float32))
-        return values
+        return shortest(np.array(column.to_numpy(), np.float32)).astype(object)
     if types.is_timestamp(column.type):
         # nanoseconds are more than Python's own times hold
         column = column.cast(pyarrow.timestamp("us", column.type.tz), safe=False)
+    values = np.empty(len(column), object)
     values[:] = [convert_value(value) for value in column.to_pylist()]
     return values
 
 
 def convert_value(value: Any) -> Any:
-    if isinstance(value, (dict, list)):
+    if isinstance(value, dict | list):
         return json.dumps(value, default=str)
     if isinstance(value, Decimal):
         return float(value)
-    return str(value) if isinstance(value, (time, timedelta)) else value
+    return str(value) if isinstance(value, time | timedelta) else value
 
 
 def select_rows(
-    names: Sequence[str], columns: Sequence[np.ndarray], where: str, path: str | Path
+    names: Sequence[str], columns: Sequence[np.ndarray], where: str, path: FilePath
 ) -> np.ndarray:
     """Return the numbers of the rows of `columns` (n,) that meet a condition in SQL (SQLite's)."""
     listed = ", ".join(["hiproof_row integer primary key", *map(quote, names)])
-    places = ", ".join("?" * (1 + len(names)))
-    numbers = range(len(columns[0]) if columns else 0)
-    rows = zip(numbers, *(map(plain_value, column) for column in columns), strict=True)
+    rows = zip(*(map(plain_value, column) for column in columns), strict=True)
     try:
         with closing(sqlite3.connect(":memory:")) as database:
             database.execute(f"create table features ({listed})")
-            database.executemany(f"insert into features values ({places})", rows)
-            sql = f"select hiproof_row from features where {where} order by hiproof_row"
+            database.executemany(f"insert into features values (null{', ?' * len(names)})", rows)
+            sql = f"select hiproof_row - 1 from features where {where} order by hiproof_row"
             return np.array(database.execute(sql).fetchall(), np.int64).reshape(-1)
     except sqlite3.Error as error:
         raise InputError(
@@ -135,7 +131,7 @@ class GeometryColumn:
     """The geometry of a file as its metadata describe it.
 
     `others` are further columns of geometries. `sides` are the columns of a row's box, each the
-    names on the way to it, None where the file has none. `bounds` is the box of all rows, None
+    names on the way to it, none where the file has none. `bounds` is the box of all rows, None
     where it is not told.
     """
 
@@ -143,11 +139,16 @@ class GeometryColumn:
     encoding: str
     crs: CRS | None
     others: tuple[str, ...]
-    sides: tuple[tuple[str, ...], ...] | None
+    sides: tuple[tuple[str, ...], ...]
     bounds: tuple[float, ...] | None
 
+    @property
+    def boxes(self) -> set[str]:
+        """The columns that hold the rows' boxes."""
+        return {way[0] for way in self.sides}
 
-def is_parquet(path: str | Path) -> bool:
+
+def is_parquet(path: FilePath) -> bool:
     """Return whether a footprint source is a Parquet file.
 
     A file is recognised by its first bytes, an address by its suffix.
@@ -167,7 +168,7 @@ def is_parquet(path: str | Path) -> bool:
 
 
 @contextmanager
-def open_parquet(path: str | Path) -> Iterator[Any]:
+def open_parquet(path: FilePath) -> Iterator[Any]:
     """Yield pyarrow's ParquetFile; raises InputError for what goes wrong, in the block, too."""
     parquet = import_pyarrow()
     if is_url(path):
@@ -186,7 +187,7 @@ def open_parquet(path: str | Path) -> Iterator[Any]:
             ) from error
 
 
-def geometry_column(file: Any, path: str | Path) -> GeometryColumn:
+def geometry_column(file: Any, path: FilePath) -> GeometryColumn:
     """Return the main geometry column; raises InputError for none of a known kind."""
     try:
         geo = json.loads((file.metadata.metadata or {})[b"geo"])
@@ -214,18 +215,16 @@ def geometry_column(file: Any, path: str | Path) -> GeometryColumn:
     )
 
 
-def sides_of_rows(told: dict[str, Any], schema: Any) -> tuple[tuple[str, ...], ...] | None:
+def sides_of_rows(told: dict[str, Any], schema: Any) -> tuple[tuple[str, ...], ...]:
     """Return columns of rows' boxes by metadata, else of `bbox` as before version 1.1."""
     from pyarrow import types
 
     covering = (told.get("covering") or {}).get("bbox")
     if covering:
         return tuple(tuple(covering[side]) for side in BOX_COLUMNS)
-    kind = {field.name: field.type for field in schema}.get("bbox")
-    if kind is None or not types.is_struct(kind):
-        return None
-    names = {field.name for field in kind.fields}
-    return tuple(("bbox", side) for side in BOX_COLUMNS) if names.issuperset(BOX_COLUMNS) else None
+    kinds = [field.type for field in schema if field.name == "bbox"]
+    names = {f.name for kind in kinds if types.is_struct(kind) for f in kind.fields}
+    return tuple(("bbox", side) for side in BOX_COLUMNS if names.issuperset(BOX_COLUMNS))
 
 
 def read_rows(
@@ -240,8 +239,8 @@ def read_rows(
 
     counts = [file.metadata.row_group(i).num_rows for i in range(file.num_row_groups)]
     first = np.cumsum([0, *counts])
-    boxes = sorted({way[0] for way in column.sides or ()}) if extent is not None else []
-    wanted = list(dict.fromkeys([*names, column.name, *boxes]))
+    own = [*names, column.name]
+    wanted = list(dict.fromkeys([*own, *(sorted(column.boxes) if extent is not None else ())]))
     tables = [file.schema_arrow.empty_table().select(wanted)]
     numbers = [np.zeros(0, np.int64)]
     for group in groups_meeting(file, column, extent):
@@ -249,14 +248,13 @@ def read_rows(
         met = rows_meeting(table, column, extent)
         tables.append(table.take(met))
         numbers.append(first[group] + met)
-    table = pyarrow.concat_tables(tables)
-    return table.select([*names, column.name]), np.concatenate(numbers)
+    return pyarrow.concat_tables(tables).select(own), np.concatenate(numbers)
 
 
 def groups_meeting(file: Any, column: GeometryColumn, extent: shapely.Geometry | None) -> list[int]:
     """Return the row groups that may hold rows in `extent`, by statistics of the boxes."""
     groups = list(range(file.num_row_groups))
-    if extent is None or column.sides is None:
+    if extent is None or not column.sides:
         return groups
     from pyarrow import ArrowException, dataset
 
@@ -276,15 +274,13 @@ def rows_meeting(table: Any, column: GeometryColumn, extent: shapely.Geometry | 
     """Return ascending numbers of the rows of `table` whose boxes meet `extent`."""
     if extent is None:
         return np.arange(len(table))
-    if column.sides is None:
-        boxes = shapely.bounds(geometries_in(table, column))
-    else:
+    if column.sides:
         boxes = np.column_stack([numbers_at(table, way) for way in column.sides])
-    known = np.isfinite(boxes).all(axis=1)
-    met = np.zeros(len(table), bool)
+    else:
+        boxes = shapely.bounds(geometries_in(table, column))
+    known = np.flatnonzero(np.isfinite(boxes).all(axis=1))
     shapely.prepare(extent)
-    met[known] = shapely.intersects(extent, shapely.box(*boxes[known].T))
-    return np.flatnonzero(met)
+    return known[shapely.intersects(extent, shapely.box(*boxes[known].T))]
 
 
 def numbers_at(table: Any, way: Sequence[str]) -> np.ndarray:

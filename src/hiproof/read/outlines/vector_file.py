@@ -18,7 +18,7 @@ from pyogrio.util import vsi_path
 
 from ...errors import InputError, explain_fault, warn
 from ...frames import Box
-from ..remote import is_url
+from ..remote import FilePath, is_url
 from .attribute_columns import restore_declared_type
 from .polygons import Features, decode_geometries
 
@@ -151,7 +151,7 @@ def virtual_layer(path: str, layer: str, geometry: str = "", text: str = "") -> 
 
 
 def read_features(
-    path: str | Path,
+    path: FilePath,
     layer: str | int | None,
     where: str | None,
     make_box: Callable[[Any], Box | None],
@@ -177,13 +177,13 @@ def read_features(
     return meta, numbers, decode_geometries(wkb), columns
 
 
-def read_crs(path: str | Path, layer: str | int | None) -> str | None:
+def read_crs(path: FilePath, layer: str | int | None) -> str | None:
     """Return the CRS that a layer names, in GDAL's form."""
     return open_layer(path, layer)[2]["crs"]
 
 
 def open_layer(
-    path: str | Path, layer: str | int | None
+    path: FilePath, layer: str | int | None
 ) -> tuple[str, str | int | None, dict[str, Any]]:
     """Return what pyogrio can open in place of `path`, the layer there, and its metadata."""
     with translate_read_errors(path):
@@ -191,7 +191,7 @@ def open_layer(
         return source, layer, pyogrio.read_info(source, layer=layer)
 
 
-def choose_layer(path: str | Path, layer: str | int | None) -> str | int | None:
+def choose_layer(path: FilePath, layer: str | int | None) -> str | int | None:
     """Return `layer`, or the only one with geometries; InputError lists several."""
     if layer is not None:
         return layer
@@ -205,7 +205,7 @@ def choose_layer(path: str | Path, layer: str | int | None) -> str | int | None:
 
 
 @contextmanager
-def translate_read_errors(path: str | Path, info: dict[str, Any] | None = None) -> Iterator[None]:
+def translate_read_errors(path: FilePath, info: dict[str, Any] | None = None) -> Iterator[None]:
     """Turn pyogrio's errors in the block into InputErrors.
 
     The error lists the layers where that helps. With the `info` of a layer it lists the attributes
@@ -234,7 +234,7 @@ def translate_read_errors(path: str | Path, info: dict[str, Any] | None = None) 
         raise unreadable(path, error) from error
 
 
-def unreadable(path: str | Path, error: Exception) -> InputError:
+def unreadable(path: FilePath, error: Exception) -> InputError:
     is_local = not is_url(path) and not str(path).startswith(("/vsi", "PG:"))
     # what follows is advice on GDAL's own options
     reason = str(error).partition("; It might help")[0].rstrip(".")

@@ -24,60 +24,45 @@ from ...errors import InputError, warn
 from ...frames import Box
 from ...log import count_things
 from ..plausible import Implausible
-from ..remote import is_url, open_binary
+from ..remote import FilePath, is_url, open_binary
 from .las_header import LasFacts, Octree, check_all_points, check_points, read_facts
 from .runs import compute_run_boxes
 
 
-def copc_points(
-    file: BinaryIO, facts: LasFacts, octree: Octree, box: Box
-) -> tuple[np.ndarray, Decoded]:
-    """Return nodes that meet `box` (xmin, ymin, xmax, ymax), and their points in order."""
-    nodes = find_nodes(facts, octree, box)
-    chunks = list(zip(nodes["points"].tolist(), nodes["bytes"].tolist(), strict=True))
+def find_nodes(octree: Octree, box: Box) -> Octree:
+    """Return the nodes with points that meet `box` (xmin, ymin, xmax, ymax) in plan."""
+    lower, upper = octree.lower[:, :2], octree.upper[:, :2]
+    meets = (lower <= box[2:]).all(axis=1) & (upper >= box[:2]).all(axis=1)
+    return Octree(*(values[meets] for values in octree))
+
+
+def read_nodes(file: BinaryIO, nodes: np.ndarray, facts: LasFacts) -> Decoded:
+    """Read the points of `nodes`, node after node."""
     file.seek(0)
     form = laspy.LasHeader.read_from(file, read_evlrs=False).point_format
     points = laspy.PackedPointRecord.zeros(int(nodes["points"].sum()), form)
-    if len(nodes):
-        compressed = np.frombuffer(b"".join(read_node(file, node) for node in nodes), np.uint8)
-        laszip = np.frombuffer(facts.laszip, np.uint8)
-        content, selection = points.array.view(np.uint8), SELECTION.to_lazrs()
-        lazrs.decompress_points_with_chunk_table(compressed, laszip, content, chunks, selection)
-    return nodes, take_fields(points, facts)
+    bodies = []
+    for start, size in zip(nodes["start"].tolist(), nodes["bytes"].tolist(), strict=True):
+        file.seek(start)
+        bodies.append(file.read(size))
+    if bodies:
+        lazrs.decompress_points_with_chunk_table(
+            np.frombuffer(b"".join(bodies), np.uint8),
+            np.frombuffer(facts.laszip, np.uint8),
+            points.array.view(np.uint8),
+            nodes[["points", "bytes"]].tolist(),
+            SELECTION.to_lazrs(),
+        )
+    return take_fields(points, facts)
 
 
-def read_node(file: BinaryIO, node: np.void) -> bytes:
-    file.seek(int(node["start"]))
-    return file.read(int(node["bytes"]))
-
-
-def find_nodes(facts: LasFacts, octree: Octree, box: Box) -> np.ndarray:
-    """Return the nodes with points that meet `box` in plan, in the file's order."""
-    lower, upper = cubes(facts, octree, octree.nodes)
-    meets = (lower[:, :2] <= box[2:]).all(axis=1) & (upper[:, :2] >= box[:2]).all(axis=1)
-    result = octree.nodes[meets]
-    return result[np.argsort(result["start"], kind="stable")]
-
-
-def cubes(facts: LasFacts, octree: Octree, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return corners (n, 3) of nodes' cubes, wider by what rounding may move a point."""
-    level, place = nodes["key"][:, :1], nodes["key"][:, 1:]
-    side = np.ldexp(2 * octree.half, -level)
-    lower = octree.centre - octree.half + place * side
-    return lower - facts.rounding, lower + side + facts.rounding
-
-
-def check_nodes(xyz: np.ndarray, nodes: np.ndarray, facts: LasFacts, octree: Octree) -> None:
+def check_nodes(xyz: np.ndarray, octree: Octree) -> None:
     """Raise Implausible where points `xyz` (n, 3), node after node, leave their cubes."""
-    if not len(nodes):
-        return
-    starts = np.cumsum([0, *nodes["points"][:-1]])
-    lower, upper = cubes(facts, octree, nodes)
-    outside = (np.minimum.reduceat(xyz, starts) < lower) | (
-        np.maximum.reduceat(xyz, starts) > upper
-    )
+    starts = np.cumsum([0, *octree.nodes["points"][:-1]])
+    lowest, highest = (f.reduceat(xyz, starts) for f in (np.minimum, np.maximum))
+    outside = ((lowest < octree.lower) | (highest > octree.upper)).any(axis=1)
     if outside.any():
-        level, *place = nodes["key"][np.argmax(outside.any(axis=1))].tolist()
+        level, *place = octree.nodes["key"][np.argmax(outside)].tolist()
         raise Implausible(
             f"its octree's node {place} of level {level} has points outside its bounds; it is "
             "damaged"
@@ -128,7 +113,7 @@ Chunk = tuple[np.ndarray, np.ndarray | None]
 
 
 @contextmanager
-def translate_errors(path: str | Path) -> Iterator[None]:
+def translate_errors(path: FilePath) -> Iterator[None]:
     """Turn whatever lazrs raises on a damaged file into one InputError."""
     try:
         yield
@@ -153,7 +138,7 @@ def translate_errors(path: str | Path) -> Iterator[None]:
         ) from error
 
 
-def read_checked_facts(path: str | Path) -> LasFacts:
+def read_checked_facts(path: FilePath) -> LasFacts:
     """Return the facts of a header that passed its checks; raises InputError otherwise."""
     with translate_errors(path):
         return facts_at(str(path), None if is_url(path) else Path(path).stat().st_mtime_ns)
@@ -167,7 +152,7 @@ def facts_at(path: str, changed: int | None) -> LasFacts:
 
 
 def las_chunks(
-    path: str | Path,
+    path: FilePath,
     chunk_points: int,
     box: Box | None = None,
     runs: np.ndarray | None = None,
@@ -198,30 +183,32 @@ def las_chunks(
     log_withheld(left_out, path)
 
 
-def is_copc(path: str | Path) -> bool:
+def is_copc(path: FilePath) -> bool:
     """Return whether the file is cloud-optimised: its first VLR is COPC's."""
     with translate_errors(path), open_binary(path) as file:
         head = file.read(400)
     return head[375 + 2 : 375 + 6] == b"copc"
 
 
-def copc_chunk(path: str | Path, box: Box) -> Chunk:
+def copc_chunk(path: FilePath, box: Box) -> Chunk:
     facts = read_checked_facts(path)
     with translate_errors(path), open_binary(path) as file:
         if facts.octree is None:
             raise Implausible(
                 "its first record says that it is COPC, and none tells of an octree; it is damaged"
             )
-        nodes, (xyz, classes, is_withheld) = copc_points(file, facts, facts.octree, box)
+        octree = find_nodes(facts.octree, box)
+        xyz, classes, is_withheld = read_nodes(file, octree.nodes, facts)
         lower, upper = check_points(xyz, facts)
-        check_nodes(xyz, nodes, facts, facts.octree)
+        if len(xyz):
+            check_nodes(xyz, octree)
         if 0 < len(xyz) == facts.count:
             check_all_points(lower, upper, facts)
     log_withheld(int(is_withheld.sum()), path)
     return xyz[~is_withheld], classes[~is_withheld]
 
 
-def log_withheld(count: int, path: str | Path) -> None:
+def log_withheld(count: int, path: FilePath) -> None:
     """Log once, not by the chunk, how many points of a file were withheld."""
     if count:
         warn(path, f"{count_things(count, 'point')} flagged as withheld left out")

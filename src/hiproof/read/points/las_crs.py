@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import struct
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import Any
 
 from pyproj import CRS
@@ -36,37 +36,25 @@ PROJECTED, GEOGRAPHIC, GEOCENTRIC = 1, 2, 3  # values of the key MODEL
 ELLIPSOIDAL = range(5001, 5034)  # geoTIFF 1.0's codes of heights above an ellipsoid
 
 
-@dataclass(frozen=True)
-class GeoKeys:
+class GeoKeys(dict[int, Any]):
     """The values of a key directory by their number."""
-
-    values: dict[int, Any]
 
     @classmethod
     def of(cls, directory: bytes, doubles: bytes = b"", texts: bytes = b"") -> GeoKeys:
         """Decode the three records. Raises CRSError for a directory that is damaged.
 
-        >>> GeoKeys.of(struct.pack("<8H", 1, 1, 0, 1, 3072, 0, 1, 28992)).values
+        >>> GeoKeys.of(struct.pack("<8H", 1, 1, 0, 1, 3072, 0, 1, 28992))
         {3072: 28992}
         """
-        count = struct.unpack_from("<4H", directory)[3] if len(directory) >= 8 else 0
-        if (
-            (count == 0 and any(directory[8:]))
-            or len(directory) < 8 + 8 * count
-            or directory[:2] != b"\1\0"
-        ):
+        rows = list(struct.iter_unpack("<4H", directory[: len(directory) // 8 * 8]))
+        version, _, _, count = rows[0] if rows else (0, 0, 0, 0)
+        if version != 1 or len(rows) <= count or (count == 0 and any(directory[8:])):
             raise CRSError(f"a key directory of {len(directory)} bytes that tells of {count} keys")
-        entries = struct.iter_unpack("<4H", directory[8 : 8 + 8 * count])
-        return cls(
-            {
-                key: value_at(place, length, position, doubles, texts)
-                for key, place, length, position in entries
-            }
-        )
+        return cls((key, value_at(entry, doubles, texts)) for key, *entry in rows[1 : count + 1])
 
     def code(self, key: int) -> int:
         """Return the value of a key that holds a code, UNDEFINED if it is missing."""
-        value = self.values.get(key, UNDEFINED)
+        value = self.get(key)
         return value if isinstance(value, int) else UNDEFINED
 
     def plan(self) -> CRS | None:
@@ -84,23 +72,22 @@ class GeoKeys:
         return self.local_plan() if self.code(PLAN_UNIT) else None
 
     def local_plan(self) -> CRS:
-        """Return a local CRS in the unit of a projection of the file's own."""
-        name, unit = self.citation(), self.plan_unit()
+        """Return a local CRS, axes east and north, in the unit of the file's own projection."""
+        citation = self.get(PROJECTED_CITATION) or self.get(CITATION) or "a projection of its own"
+        name, unit = str(citation).replace('"', "'"), self.plan_unit()
         if unit is None:
             raise CRSError(f"{name}, a projection of its own without a unit")
-        return local_crs(name, *unit)
-
-    def citation(self) -> str:
-        """Return the file's name for its projection."""
-        citation = self.values.get(PROJECTED_CITATION) or self.values.get(CITATION)
-        return str(citation or "a projection of its own").replace('"', "'")
+        return CRS.from_wkt(
+            f'LOCAL_CS["{name}",LOCAL_DATUM["unknown",0],UNIT["{unit[0]}",{unit[1]!r}],'
+            'AXIS["X",EAST],AXIS["Y",NORTH]]'
+        )
 
     def plan_unit(self) -> tuple[str, float] | None:
         """Name and length (m) of the unit in plan, None where no key names it."""
         code = self.code(PLAN_UNIT)
         if code == USER_DEFINED:
-            size = self.values.get(PLAN_UNIT_SIZE)
-            return ("unit of its own", float(size)) if isinstance(size, float) else None
+            size = self.get(PLAN_UNIT_SIZE)
+            return ("unit of its own", size) if isinstance(size, float) else None
         return None if code == UNDEFINED else decode_unit(code)
 
     def heights(self) -> CRS | None:
@@ -110,16 +97,14 @@ class GeoKeys:
         if unit in (UNDEFINED, USER_DEFINED):
             return vertical_crs
         name, factor = decode_unit(unit)
-        if (
-            vertical_crs is not None
-            and abs(vertical_crs.axis_info[0].unit_conversion_factor / factor - 1) < 1e-9
-        ):
+        if vertical_crs is not None and counts_in(vertical_crs, factor):
             return vertical_crs
         return heights_in("height" if vertical_crs is None else vertical_crs.name, name, factor)
 
 
-def value_at(place: int, length: int, position: int, doubles: bytes, texts: bytes) -> Any:
+def value_at(entry: Sequence[int], doubles: bytes, texts: bytes) -> Any:
     """Return a directory entry's value, None where it points beyond its record."""
+    place, length, position = entry
     if place == 0:
         return position
     if place == DOUBLES and 8 * (position + 1) <= len(doubles):
@@ -129,23 +114,11 @@ def value_at(place: int, length: int, position: int, doubles: bytes, texts: byte
     return None
 
 
-def decode_crs(directory: bytes, doubles: bytes = b"", texts: bytes = b"") -> CRS | None:
-    """Return the CRS of plan and heights that the keys define, or of heights alone, or None.
-
-    Raises CRSError for keys that cannot be understood.
-    """
-    keys = GeoKeys.of(directory, doubles, texts)
-    plan, heights = keys.plan(), keys.heights()
-    return heights if plan is None else combine(plan, heights)
-
-
 def decode_vertical_crs(code: int) -> CRS:
     """Return a vertical CRS by EPSG's code or by one of GeoTIFF 1.0's own."""
-    if epsg := READING["geotiff_heights"].get(str(code)):
-        return CRS.from_epsg(epsg)
     if code in ELLIPSOIDAL:
         return heights_in("ellipsoidal height", "metre", 1.0)
-    named_crs = CRS.from_epsg(code)
+    named_crs = CRS.from_epsg(READING["geotiff_heights"].get(str(code), code))
     if not named_crs.is_vertical:
         raise CRSError(f"EPSG:{code} ({named_crs.name}) in place of a height system")
     return named_crs
@@ -170,9 +143,14 @@ def decode_unit(code: int) -> tuple[str, float]:
     return linear_units()[code]
 
 
+def counts_in(crs: CRS, factor: float) -> bool:
+    """Return whether the first axis of a CRS counts in a unit of `factor` metres."""
+    return abs(crs.axis_info[0].unit_conversion_factor / factor - 1) < 1e-9
+
+
 def with_unit(crs: CRS, unit: tuple[str, float] | None) -> CRS:
     """Return a projected CRS in `unit` (name, metres) in place of its code's."""
-    if unit is None or abs(crs.axis_info[0].unit_conversion_factor / unit[1] - 1) < 1e-9:
+    if unit is None or counts_in(crs, unit[1]):
         return crs
     name, factor = unit
     definition = crs.to_json_dict()
@@ -180,13 +158,6 @@ def with_unit(crs: CRS, unit: tuple[str, float] | None) -> CRS:
         axis["unit"] = {"type": "LinearUnit", "name": name, "conversion_factor": factor}
     definition.pop("id", None)
     return CRS.from_json_dict({**definition, "name": f"{crs.name} ({name})"})
-
-
-def local_crs(name: str, unit: str, factor: float) -> CRS:
-    """Make a local CRS of axes east and north in a unit of `factor` metres."""
-    return CRS.from_wkt(
-        f'LOCAL_CS["{name}",LOCAL_DATUM["unknown",0],UNIT["{unit}",{factor!r}],AXIS["X",EAST],AXIS["Y",NORTH]]'
-    )
 
 
 def heights_in(name: str, unit: str, factor: float) -> CRS:
@@ -202,34 +173,39 @@ WKT = 2112  # number of the record that holds a WKT
 
 def las_crs(records: dict[int, bytes]) -> CRS | UnknownCRS | None:
     """Return the CRS of records (by number) of LASF_Projection, heights of keys, or None."""
-    text = decode_wkt(records.get(WKT, b""))
-    result, faults = [], []
-    for is_there, read in (
-        (bool(text), lambda: CRS.from_wkt(text)),
-        (
-            DIRECTORY in records,
-            lambda: decode_crs(*(records.get(id, b"") for id in (DIRECTORY, DOUBLES, TEXTS))),
-        ),
-    ):
+    found, faults = [], []
+    for read in (read_text, read_keys):
         try:
-            result.append(read() if is_there else None)
+            found.append(read(records))
         except CRSError as error:
-            result.append(None)
+            found.append(None)
             faults.append(explain_crs_error(error))
-    by_text, by_keys = result
+    by_text, by_keys = found
     if by_text is None and by_keys is None:
         return UnknownCRS(faults[0]) if faults else None
-    if by_text is None:
-        return by_keys
-    if by_keys is None:
-        return by_text
+    if by_text is None or by_keys is None:
+        return by_keys if by_text is None else by_text
     return combine(by_text, by_keys if names_heights_alone(by_keys) else vertical_crs(by_keys))
 
 
-def decode_wkt(content: bytes) -> str:
-    """Decode WKT as UTF-8, the standard, or Latin-1 of writers that did not know."""
+def read_text(records: dict[int, bytes]) -> CRS | None:
+    """Return the CRS of WKT in UTF-8, the standard, or in Latin-1 of writers that did not know."""
+    content = records.get(WKT, b"")
     try:
         text = content.decode()
     except UnicodeDecodeError:
         text = content.decode("latin-1")
-    return text.split("\0")[0].strip()
+    text = text.split("\0")[0].strip()
+    return CRS.from_wkt(text) if text else None
+
+
+def read_keys(records: dict[int, bytes]) -> CRS | None:
+    """Return the CRS of plan and heights that the keys define, or of heights alone, or None.
+
+    Raises CRSError for keys that cannot be understood.
+    """
+    if DIRECTORY not in records:
+        return None
+    keys = GeoKeys.of(*(records.get(number, b"") for number in (DIRECTORY, DOUBLES, TEXTS)))
+    plan, heights = keys.plan(), keys.heights()
+    return heights if plan is None else combine(plan, heights)

@@ -27,15 +27,19 @@ COMPRESSED, VARIABLE_CHUNKS, LAYERED = 0x80, 2**32 - 1, 3
 # units of a coordinate's last digit; no survey is coarser, a damaged header is
 COARSEST_SCALE = 10.0
 MOST_CHUNK_POINTS = 10_000_000  # a decoder makes room for a whole chunk; LASzip's own have 50,000
+ITEMS = np.dtype([("kind", "<u2"), ("bytes", "<u2"), ("version", "<u2")])  # of LASzip's record
 NODES = np.dtype([("key", "<i4", 4), ("start", "<u8"), ("bytes", "<i4"), ("points", "<i4")])
 
 
 class Octree(NamedTuple):
-    """COPC's octree: `nodes` (n,) of NODES with points, `centre` (3,), half its width."""
+    """COPC's octree: `nodes` (n,) of NODES with points, in the file's order, and their cubes.
+
+    The cubes reach from `lower` to `upper` (n, 3), wider by what rounding may move a point.
+    """
 
     nodes: np.ndarray
-    centre: np.ndarray
-    half: float
+    lower: np.ndarray
+    upper: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -49,12 +53,9 @@ class LasFacts:
     """
 
     size: int
-    minor: int
     created: tuple[int, int]
     has_gps_time: bool
-    header_bytes: int
     data_start: int
-    records: int
     point_format: int
     compressed: bool
     point_bytes: int
@@ -65,7 +66,6 @@ class LasFacts:
     offsets: np.ndarray
     mins: np.ndarray
     maxs: np.ndarray
-    far_records: tuple[int, int]
     laszip: bytes = b""
     octree: Octree | None = None
     projection: dict[int, bytes] = field(default_factory=dict)
@@ -80,32 +80,16 @@ def read_facts(file: BinaryIO) -> LasFacts:
     """Read and check the header of an open file; raises Implausible with the reason."""
     size = file.seek(0, 2)
     file.seek(0)
-    facts = parse_header(file.read(max(HEADER_BYTES.values())), size)
-    if not HEADER_BYTES[facts.minor] <= facts.header_bytes <= facts.data_start <= facts.points_end:
-        raise Implausible(
-            f"its header of {facts.header_bytes} bytes tells of points from byte "
-            f"{facts.data_start} to {facts.points_end}; it is truncated or damaged"
-        )
-    if (
-        facts.point_format >= len(RECORD_BYTES)
-        or facts.point_bytes < RECORD_BYTES[facts.point_format]
-    ):
-        raise Implausible(
-            f"its header tells of points of format {facts.point_format} in {facts.point_bytes} "
-            "bytes each"
-        )
-    records = dict(iterate_records(file, facts))
-    projection = {
-        number: content for (user, number), content in records.items() if user == "LASF_Projection"
-    }
+    facts, sections = parse_header(file.read(max(HEADER_BYTES.values())), size)
+    records = dict(record for section in sections for record in iterate_records(file, *section))
     facts = replace(
-        facts, laszip=records.get(("laszip encoded", 22204), b""), projection=projection
+        facts,
+        laszip=records.get(("laszip encoded", 22204), b""),
+        projection={n: content for (u, n), content in records.items() if u == "LASF_Projection"},
     )
-    points = (
-        compressed_points(file, facts)
-        if facts.compressed
-        else (facts.points_end - facts.data_start) // facts.point_bytes
-    )
+    points = (facts.points_end - facts.data_start) // facts.point_bytes
+    if facts.compressed:
+        points = compressed_points(file, facts)
     if points != facts.count:
         raise Implausible(
             f"its header tells of {facts.count} points, its data of {points}; it is truncated or "
@@ -116,8 +100,12 @@ def read_facts(file: BinaryIO) -> LasFacts:
     return with_octree(file, facts, records["copc", 1]) if ("copc", 1) in records else facts
 
 
-def parse_header(head: bytes, size: int) -> LasFacts:
-    """Parse the public header block from `head`, the file's first bytes."""
+# Sections of records: where they start and end, their number, and the form of the head of each.
+Section = tuple[int, int, int, str]
+
+
+def parse_header(head: bytes, size: int) -> tuple[LasFacts, tuple[Section, ...]]:
+    """Parse the public header block from `head`, the file's first bytes, and tell of records."""
     if head[:4] != b"LASF" or len(head) < HEADER_BYTES[0]:
         raise Implausible(f"it ends after {size} bytes, inside its header; it is truncated")
     major, minor = head[24], head[25]
@@ -128,66 +116,73 @@ def parse_header(head: bytes, size: int) -> LasFacts:
         )
     # what an older version does not have is 0
     values = HEADER.unpack(head[: HEADER_BYTES[minor]].ljust(HEADER.size, b"\0")[: HEADER.size])
-    encoding, day, year, header_bytes, data_start, records, *points = values[:9]
-    point_format, point_bytes, count = points
+    encoding, day, year, header_bytes, data_start, records, kind, point_bytes, count = values[:9]
     wave_start, far_start, far_count, long_count = values[26:]
+    point_format = kind & ~COMPRESSED
     if minor >= 4:
         legacy, count = count, long_count
         # a writer may leave the old field at 0 although older readers know the points' format: LAS
         # 1.4 allows it
-        if point_format & ~COMPRESSED < 6 and legacy not in (0, count) and count <= 2**32 - 1:
+        if point_format < 6 and legacy not in (0, count) and count <= 2**32 - 1:
             raise Implausible(
                 f"its header tells of {count} points and, in the field for older readers, of "
                 f"{legacy}"
             )
-    numbers = np.array(values[14:26])
     ends = [wave_start if encoding & 2 else 0, far_start if far_count else 0]
-    return LasFacts(
+    points_end = min([size, *filter(None, ends)])
+    if not HEADER_BYTES[minor] <= header_bytes <= data_start <= points_end:
+        raise Implausible(
+            f"its header of {header_bytes} bytes tells of points from byte {data_start} to "
+            f"{points_end}; it is truncated or damaged"
+        )
+    if point_format >= len(RECORD_BYTES) or point_bytes < RECORD_BYTES[point_format]:
+        raise Implausible(
+            f"its header tells of points of format {point_format} in {point_bytes} bytes each"
+        )
+    numbers = np.array(values[14:26])
+    facts = LasFacts(
         size,
-        minor,
         (day, year),
         bool(encoding & 1),
-        header_bytes,
         data_start,
-        records,
-        point_format & ~COMPRESSED,
-        bool(point_format & COMPRESSED),
+        point_format,
+        bool(kind & COMPRESSED),
         point_bytes,
         count,
         sum(values[9:14]),
-        min([size, *filter(None, ends)]),
+        points_end,
         scales=numbers[:3],
         offsets=numbers[3:6],
         maxs=numbers[6::2],
         mins=numbers[7::2],
-        far_records=(far_start, far_count),
+    )
+    return facts, (
+        (header_bytes, data_start, records, "<2x16sHH32x"),
+        (far_start, size, far_count, "<2x16sHQ32x"),
     )
 
 
-def iterate_records(file: BinaryIO, facts: LasFacts) -> Iterator[tuple[tuple[str, int], bytes]]:
-    """Yield records as ((user id, number), content), none beyond its place."""
-    far_start, far_count = facts.far_records
-    for start, end, count, form in (
-        (facts.header_bytes, facts.data_start, facts.records, "<2x16sHH32x"),
-        (far_start, facts.size, far_count, "<2x16sHQ32x"),
-    ):
-        head_bytes = struct.calcsize(form)
-        if start + count * head_bytes > end:
+def iterate_records(
+    file: BinaryIO, start: int, end: int, count: int, form: str
+) -> Iterator[tuple[tuple[str, int], bytes]]:
+    """Yield the records of a section as ((user id, number), content), none beyond its place."""
+    head_bytes = struct.calcsize(form)
+    if start + count * head_bytes > end:
+        raise Implausible(
+            f"its header tells of {count} records from byte {start} on, where only "
+            f"{end - start} are left"
+        )
+    for _ in range(count):
+        file.seek(start)
+        user, number, length = struct.unpack(form, file.read(head_bytes))
+        start += head_bytes + length
+        if start > end:
             raise Implausible(
-                f"its header tells of {count} records from byte {start} on, where only "
-                f"{end - start} are left"
+                f"its record {number} ends at byte {start}, beyond byte {end}; it is truncated "
+                "or damaged"
             )
-        for _ in range(count):
-            file.seek(start)
-            user, number, length = struct.unpack(form, file.read(head_bytes))
-            start += head_bytes + length
-            if start > end:
-                raise Implausible(
-                    f"its record {number} ends at byte {start}, beyond byte {end}; it is truncated "
-                    "or damaged"
-                )
-            content = file.read(length) if length <= 0xFFFF else b""
-            yield (user.split(b"\0")[0].decode("latin-1"), number), content
+        content = file.read(length) if length <= 0xFFFF else b""
+        yield (user.split(b"\0")[0].decode("latin-1"), number), content
 
 
 def compressed_points(file: BinaryIO, facts: LasFacts) -> int:
@@ -201,15 +196,9 @@ def compressed_points(file: BinaryIO, facts: LasFacts) -> int:
         raise Implausible(
             "its header tells of compressed points, but how they are compressed it does not say"
         )
-    compressor, chunk_points, items = (
-        *struct.unpack_from("<H10xI", laszip),
-        struct.unpack_from("<H", laszip, 32)[0],
-    )
-    item_bytes = sum(
-        struct.unpack_from("<H", laszip, 36 + 6 * i)[0]
-        for i in range(items)
-        if 40 + 6 * i <= len(laszip)
-    )
+    compressor, chunk_points, items = struct.unpack_from("<H10xI16xH", laszip)
+    described = np.frombuffer(laszip[34:][: (len(laszip) - 34) // 6 * 6], ITEMS)
+    item_bytes = described["bytes"][:items].sum(dtype=int)
     if item_bytes != facts.point_bytes:
         raise Implausible(
             f"its header tells of points of {facts.point_bytes} bytes, its compressor of "
@@ -217,31 +206,30 @@ def compressed_points(file: BinaryIO, facts: LasFacts) -> int:
         )
     if compressor < 2:
         return facts.count
-    chunks = chunk_table(file, facts)
-    if max((points for points, _ in chunks), default=0) > MOST_CHUNK_POINTS:
+    sizes, last = read_chunk_table(file, facts)
+    if max(sizes, default=0) > MOST_CHUNK_POINTS:
         raise Implausible(
-            f"it tells of chunks of {max(chunks)[0]} points; up to {MOST_CHUNK_POINTS} are read"
+            f"it tells of chunks of {max(sizes)} points; up to {MOST_CHUNK_POINTS} are read"
         )
-    if chunk_points == VARIABLE_CHUNKS:
-        return sum(points for points, _ in chunks)
-    if not chunks:
-        return 0
-    full = (len(chunks) - 1) * chunk_points
-    if compressor == LAYERED:
-        return full + count_last_chunk(file, facts, chunks)
+    if chunk_points == VARIABLE_CHUNKS or not sizes:
+        return sum(sizes)
+    full = (len(sizes) - 1) * chunk_points
+    if compressor == LAYERED:  # whose last chunk declares its points after its first one
+        file.seek(last + facts.point_bytes)
+        return full + struct.unpack("<I", file.read(4).ljust(4, b"\0"))[0]
     # the only second count: the last chunk of older formats has none
     if facts.count_by_return > facts.count:
         return facts.count_by_return
     if not full < facts.count <= full + chunk_points:
-        limit = full + chunk_points
         raise Implausible(
-            f"its header tells of {facts.count} points, its chunks hold from {full + 1} to {limit}"
+            f"its header tells of {facts.count} points, its chunks hold from {full + 1} to "
+            f"{full + chunk_points}"
         )
     return facts.count
 
 
-def chunk_table(file: BinaryIO, facts: LasFacts) -> list[tuple[int, int]]:
-    """Return (points, bytes) of each chunk, the full number where all are of one size."""
+def read_chunk_table(file: BinaryIO, facts: LasFacts) -> tuple[list[int], int]:
+    """Return the points of each chunk, or the full number of any, and where the last begins."""
     file.seek(facts.data_start)
     start, table = facts.data_start + 8, struct.unpack("<q", file.read(8).ljust(8, b"\xff"))[0]
     if table == -1:  # written as a stream: the place stands at the end
@@ -264,13 +252,7 @@ def chunk_table(file: BinaryIO, facts: LasFacts) -> list[tuple[int, int]]:
         raise Implausible(
             f"its chunk table does not add up to its {table - start} bytes of points; it is damaged"
         )
-    return chunks
-
-
-def count_last_chunk(file: BinaryIO, facts: LasFacts, chunks: list[tuple[int, int]]) -> int:
-    """Return the last chunk's points, as declared after its first point since LAS 1.4."""
-    file.seek(facts.data_start + 8 + sum(length for _, length in chunks[:-1]) + facts.point_bytes)
-    return struct.unpack("<I", file.read(4).ljust(4, b"\0"))[0]
+    return [points for points, _ in chunks], table - (chunks[-1][1] if chunks else 0)
 
 
 def check_coordinates(facts: LasFacts) -> None:
@@ -297,9 +279,9 @@ def with_octree(file: BinaryIO, facts: LasFacts, info: bytes) -> LasFacts:
     if len(info) < 160:
         raise Implausible(f"its COPC record has {len(info)} bytes instead of 160")
     *centre, half, _, page, page_bytes = struct.unpack_from("<5d2Q", info)
-    lower = np.array(centre) - half - facts.rounding
-    upper = np.array(centre) + half + facts.rounding
-    if facts.count and not ((facts.mins >= lower) & (facts.maxs <= upper)).all():
+    lower, upper = np.array(centre) - half, np.array(centre) + half
+    is_inside = (facts.mins >= lower - facts.rounding) & (facts.maxs <= upper + facts.rounding)
+    if facts.count and not is_inside.all():
         raise Implausible(
             f"its octree of half width {half:g} about ({format_list(centre)}) does not hold its "
             "header's bounds"
@@ -310,11 +292,14 @@ def with_octree(file: BinaryIO, facts: LasFacts, info: bytes) -> LasFacts:
         raise Implausible(
             f"its header tells of {facts.count} points, the nodes of its octree of {points}"
         )
-    return replace(facts, octree=Octree(nodes, np.array(centre), half))
+    side = np.ldexp(2 * half, -nodes["key"][:, :1])
+    corner = lower + nodes["key"][:, 1:] * side
+    octree = Octree(nodes, corner - facts.rounding, corner + side + facts.rounding)
+    return replace(facts, octree=octree)
 
 
 def walk_pages(file: BinaryIO, facts: LasFacts, page: int, page_bytes: int) -> np.ndarray:
-    """Return all nodes that hold points, visiting every page once."""
+    """Return all nodes that hold points, in the file's order, visiting every page once."""
     waiting, visited, result = [(page, page_bytes)], set(), [np.empty(0, NODES)]
     while waiting:
         start, length = waiting.pop()
@@ -332,11 +317,8 @@ def walk_pages(file: BinaryIO, facts: LasFacts, page: int, page_bytes: int) -> n
         nodes = np.frombuffer(file.read(length // NODES.itemsize * NODES.itemsize), NODES)
         fixed = nodes[nodes["points"] > 0]
         ends = fixed["start"] + np.maximum(fixed["bytes"], 0).astype(np.uint64)
-        if (
-            (nodes["points"] < -1).any()
-            or (fixed["bytes"] <= 0).any()
-            or (ends > facts.points_end).any()
-        ):
+        is_beyond = (fixed["bytes"] <= 0) | (ends > facts.points_end)
+        if is_beyond.any() or (nodes["points"] < -1).any():
             raise Implausible(
                 f"a node of its octree's page at byte {start} is beyond its points or of negative "
                 "size"
@@ -344,7 +326,8 @@ def walk_pages(file: BinaryIO, facts: LasFacts, page: int, page_bytes: int) -> n
         result.append(fixed)
         below = nodes[nodes["points"] == -1]
         waiting += zip(below["start"].tolist(), below["bytes"].tolist(), strict=True)
-    return np.concatenate(result)
+    nodes = np.concatenate(result)
+    return nodes[np.argsort(nodes["start"], kind="stable")]
 
 
 def check_points(xyz: np.ndarray, facts: LasFacts) -> tuple[np.ndarray, np.ndarray]:

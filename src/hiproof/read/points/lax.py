@@ -18,13 +18,12 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import warn
-from ...frames import Box
-from ..remote import is_url
+from ..remote import FilePath, is_url
 from .las import read_checked_facts
 from .runs import RunIndex
 
 
-def read_lax(path: str | Path) -> RunIndex | None:
+def read_lax(path: FilePath) -> RunIndex | None:
     """Read the index beside the LAS or LAZ file at `path`, None without one.
 
     One that cannot be understood, or that tells of another number of points than the file, is left
@@ -56,34 +55,29 @@ def parse_index(words: np.ndarray) -> tuple[RunIndex, int]:
     if words[3] or words[7] or words[8] or words[14]:
         raise ValueError("expected a whole quadtree with counts of 32 bits")
     min_x, max_x, min_y, max_y = words[9:13].view("<f4")
-    boxes, cell_of, runs, indexed_points, position = [], [], [], 0, 16
-    for cell in range(int(words[15])):
-        index, count, fixed = (int(word) for word in words[position : position + 3])
-        intervals = words[position + 3 : position + 3 + 2 * count].reshape(count, 2)
-        boxes.append(cell_box(index, (min_x, min_y, max_x, max_y)))
-        cell_of.append(np.full(count, cell))
-        runs.append(intervals.astype(np.int64) + [0, 1])
-        indexed_points, position = indexed_points + fixed, position + 3 + 2 * count
+    boxes, intervals, indexed_points, position = [], [], 0, 16
+    for _ in range(int(words[15])):
+        index, count, points = words[position : position + 3].tolist()
+        position += 3 + 2 * count
+        boxes.append(cell_box(index, np.array([min_x, min_y]), np.array([max_x, max_y])))
+        intervals.append(words[position - 2 * count : position].reshape(count, 2))
+        indexed_points += points
     if not boxes:
         raise ValueError("it has no cells")
-    return RunIndex(np.array(boxes), np.concatenate(cell_of), np.concatenate(runs)), indexed_points
+    cell_of = np.repeat(np.arange(len(boxes)), list(map(len, intervals)))
+    runs = np.concatenate(intervals).astype(np.int64) + [0, 1]
+    return RunIndex(np.array(boxes), cell_of, runs), indexed_points
 
 
-def cell_box(index: int, root: tuple[np.float32, ...]) -> Box:
+def cell_box(index: int, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
     """Return a cell's box, halved in float32 as the writer does, and that much wider."""
+    blur = 2 * float(np.spacing(np.abs([lower, upper]).max()))
     level = 0
     while index >= 4**level:
         index -= 4**level
         level += 1
-    lower, upper = list(root[:2]), list(root[2:])
     for step in range(level - 1, -1, -1):
-        for axis in (0, 1):
-            middle = (lower[axis] + upper[axis]) / np.float32(2)
-            (lower if index >> 2 * step & 1 + axis else upper)[axis] = middle
-    blur = 2 * float(np.spacing(np.abs(np.array(root)).max()))
-    return (
-        float(lower[0]) - blur,
-        float(lower[1]) - blur,
-        float(upper[0]) + blur,
-        float(upper[1]) + blur,
-    )
+        middle = (lower + upper) / np.float32(2)
+        is_upper = (index >> 2 * step & np.array([1, 2])) > 0
+        lower, upper = np.where(is_upper, middle, lower), np.where(is_upper, upper, middle)
+    return np.r_[lower.astype(float) - blur, upper.astype(float) + blur]

@@ -4,95 +4,71 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
-from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, NamedTuple
 
 import numpy as np
 
 from ...errors import InputError
 from ...log import count_things
 from ..names import READING
-from ..remote import open_binary
+from ..remote import FilePath, open_binary
 from .las import Chunk
-from .text import TextLayout, find_columns, parse_rows, read_classes
+from .text import TextLayout, as_chunk, find_columns, parse_rows
 
 PLY_TYPES: dict[str, str] = READING["ply_types"]
 PLAIN_COUNT = re.compile("[0-9]{1,18}")
 BYTE_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 
 
-@dataclass(frozen=True)
-class PlyLayout:
-    """The header of a PLY file, with the columns of x, y, z and class.
+class PlyLayout(NamedTuple):
+    """The header: how many `vertices`, their `record` (None: ascii), columns x, y, z, class."""
 
-    The byte order "" is ascii. Properties are (name, NumPy type).
-    """
-
-    byte_order: str
-    count: int
-    properties: tuple[tuple[str, str], ...]
+    vertices: int
+    record: np.dtype | None
     columns: tuple[int, ...]
 
 
-def ply_chunks(path: str | Path, chunk_points: int) -> Iterator[Chunk]:
+def ply_chunks(path: FilePath, chunk_points: int) -> Iterator[Chunk]:
     """Yield the vertices of a PLY file; raises InputError for a header or body of none."""
     with open_binary(path) as file:
         layout = read_ply_header(file, path)
-        refuse_missing_bytes(file, layout, path)
-        remaining = layout.count
-        while remaining:
-            table = read_vertices(
-                file, layout, min(remaining, chunk_points), path, layout.count - remaining
-            )
-            yield np.ascontiguousarray(table[:, :3]), read_classes(table)
-            remaining -= len(table)
+        start, end = file.tell(), file.seek(0, 2)
+        file.seek(start)
+        # the count is held against the file's size before room is made for so many
+        least_bytes = len("0 0 0") if layout.record is None else layout.record.itemsize
+        if layout.vertices * least_bytes > end - start:
+            raise truncated(layout, path, f"{end - start} bytes of them")
+        for read in range(0, layout.vertices, chunk_points):
+            count = min(chunk_points, layout.vertices - read)
+            table = read_vertices(file, layout, count, path, read)
+            if len(table) < count:
+                raise truncated(layout, path, read + len(table))
+            yield as_chunk(table)
 
 
-def refuse_missing_bytes(file: BinaryIO, layout: PlyLayout, path: str | Path) -> None:
-    """Hold the count against the file's size before room is made for so many."""
-    start, end = file.tell(), file.seek(0, 2)
-    file.seek(start)
-    count = len("0 0 0") if layout.byte_order == "" else record_type(layout).itemsize
-    if layout.count * count > end - start:
-        raise InputError(
-            f"expected {count_things(layout.count, 'vertex', 'vertices')} in {path} as its header "
-            f"says, got {end - start} bytes of them; the file is truncated: copy or download it "
-            "again"
-        )
-
-
-def record_type(layout: PlyLayout) -> np.dtype:
-    """Return the NumPy type of a vertex of a binary file."""
-    return np.dtype([(name, layout.byte_order + kind) for name, kind in layout.properties])
+def truncated(layout: PlyLayout, path: FilePath, got: object) -> InputError:
+    return InputError(
+        f"expected {count_things(layout.vertices, 'vertex', 'vertices')} in {path} as its header "
+        f"says, got {got}; the file is truncated: copy or download it again"
+    )
 
 
 def read_vertices(
-    file: BinaryIO, layout: PlyLayout, count: int, path: str | Path, read: int
+    file: BinaryIO, layout: PlyLayout, count: int, path: FilePath, read: int
 ) -> np.ndarray:
-    """Read the next `count` vertices (float64): x, y, z and, where there is one, class."""
-    if layout.byte_order == "":
-        table = parse_rows(file, TextLayout(0, None, layout.columns), count, path, read)
-        result = len(table)
-    else:
-        dtype = record_type(layout)
-        buffer = file.read(dtype.itemsize * count)
-        result = len(buffer) // dtype.itemsize
-        records = np.frombuffer(buffer, dtype, result)
-        table = np.column_stack(
-            [records[layout.properties[column][0]].astype(float) for column in layout.columns]
-        )
-    if result < count:
-        raise InputError(
-            f"expected {count_things(layout.count, 'vertex', 'vertices')} in {path} as its header "
-            f"says, got {read + result}; the file is truncated: copy or download it again"
-        )
-    return table
+    """Read up to `count` more vertices (float64): x, y, z and, where there is one, class."""
+    record = layout.record
+    if record is None:
+        return parse_rows(file, TextLayout(0, None, layout.columns), count, path, read)
+    buffer = file.read(record.itemsize * count)
+    rows = np.frombuffer(buffer, record, len(buffer) // record.itemsize)
+    names = np.array(record.names)[list(layout.columns)]
+    return np.column_stack([rows[name].astype(float) for name in names])
 
 
-def read_ply_header(file: BinaryIO, path: str | Path) -> PlyLayout:
+def read_ply_header(file: BinaryIO, path: FilePath) -> PlyLayout:
     """Read up to `end_header`, leaving `file` at the first vertex."""
-    properties: list[tuple[str, str]] = []
+    types: dict[str, str] = {}
     byte_order, count, element = None, None, None
     for words in header_lines(file, path):
         if words[0] == "format" and len(words) > 1:
@@ -108,16 +84,17 @@ def read_ply_header(file: BinaryIO, path: str | Path) -> PlyLayout:
         elif words[0] == "property" and element == "vertex":
             if len(words) != 3 or words[1] not in PLY_TYPES:
                 raise unreadable(path, f"the vertex property {' '.join(words[1:])!r}")
-            if words[2] in dict(properties):
+            if words[2] in types:
                 raise unreadable(path, f"the vertex property {words[2]!r} twice")
-            properties.append((words[2], PLY_TYPES[words[1]]))
-    columns = find_columns([name for name, _ in properties])
+            types[words[2]] = PLY_TYPES[words[1]]
+    columns = find_columns(list(types))
     if byte_order is None or count is None or columns is None:
         raise unreadable(path, "a header without format, vertices or their x, y, z")
-    return PlyLayout(byte_order, count, tuple(properties), columns)
+    record = [(name, byte_order + kind) for name, kind in types.items()]
+    return PlyLayout(count, np.dtype(record) if byte_order else None, columns)
 
 
-def header_lines(file: BinaryIO, path: str | Path) -> Iterator[list[str]]:
+def header_lines(file: BinaryIO, path: FilePath) -> Iterator[list[str]]:
     for _ in range(1000):
         line = file.readline(4096)
         words = line.decode("latin-1").split()
@@ -130,7 +107,7 @@ def header_lines(file: BinaryIO, path: str | Path) -> Iterator[list[str]]:
     raise unreadable(path, "a header that does not end")
 
 
-def unreadable(path: str | Path, got: str) -> InputError:
+def unreadable(path: FilePath, got: str) -> InputError:
     return InputError(
         f"expected a PLY file whose first element is the vertices with scalar x, y, z in {path}, "
         f"got {got}; export the points alone, or write them as LAZ"

@@ -27,7 +27,7 @@ from ..crs import (
     vertical_crs,
 )
 from ..plausible import MOST_HEIGHT, MOST_PLAN, compute_bounds, is_plausible
-from ..remote import is_url, locate
+from ..remote import FilePath, is_url, locate
 from . import las, ply, text
 from .las_crs import las_crs
 from .runs import RUN_POINTS
@@ -43,7 +43,7 @@ class Reader(NamedTuple):
     name: str
     suffixes: tuple[str, ...]
     start: bytes
-    chunks: Callable[[str | Path, int], Iterator[las.Chunk]]
+    chunks: Callable[[FilePath, int], Iterator[las.Chunk]]
 
 
 TEXT_SUFFIXES = (".xyz", ".txt", ".csv", ".pts", ".asc", ".xyzc")
@@ -99,7 +99,7 @@ class PointFileHeader:
 
 
 def read_points(
-    *paths: str | Path, settings: Settings | None = None, box: Box | None = None
+    *paths: FilePath, settings: Settings | None = None, box: Box | None = None
 ) -> PointCloud:
     """Read all points of the files, folders or wildcards `paths`.
 
@@ -110,28 +110,25 @@ def read_points(
     different CRSs.
     """
     files, read = expand_paths(paths), (settings or Settings()).read
-    headers = {str(file): las_file_header(file) for file in files}
-    crs_of = {file: header and header.crs for file, header in headers.items()}
+    headers = [las_file_header(file) for file in files]
+    crs_of = {str(file): h and h.crs for file, h in zip(files, headers, strict=True)}
     crs = common_crs(crs_of, parse_crs(read.crs), read.unit)
     units = find_units(crs, "the point cloud", read.unit)
-    warn_coarse([header for header in headers.values() if header], units)
+    warn_coarse([header for header in headers if header], units)
     clouds = [chunk for file in files for chunk in iter_points(file, box=box, units=units)]
     xyz = np.concatenate([cloud.xyz for cloud in clouds]) if clouds else np.empty((0, 3))
     if not len(xyz):
-        text = "" if box is None else f" inside the box {tuple(float(side) for side in box)}"
-        raise InputError(
-            f"expected points{text} in {', '.join(map(str, files))}, got none; "
-            + (
-                "check the file"
-                if box is None
-                else "check the box against the files' bounds and CRS"
-            )
-        )
-    return PointCloud(xyz, joined_classes(clouds), crs, tuple(str(file) for file in files), units)
+        place, advice = "", "check the file"
+        if box is not None:
+            place = f" inside the box {tuple(map(float, box))}"
+            advice = "check the box against the files' bounds and CRS"
+        names = ", ".join(map(str, files))
+        raise InputError(f"expected points{place} in {names}, got none; {advice}")
+    return PointCloud(xyz, join_classes(clouds), crs, tuple(map(str, files)), units)
 
 
 def iter_points(
-    path: str | Path,
+    path: FilePath,
     chunk_points: int | None = None,
     box: Box | None = None,
     runs: np.ndarray | None = None,
@@ -165,22 +162,21 @@ def iter_points(
             yield PointCloud(xyz, classes, None, (str(path),), units)
 
 
-def plausible_chunks(chunks: Iterator[las.Chunk], path: str | Path) -> Iterator[las.Chunk]:
+def plausible_chunks(chunks: Iterator[las.Chunk], path: FilePath) -> Iterator[las.Chunk]:
     """Yield chunks without points that lack coordinates; raises for impossible places."""
     dropped = 0
     for xyz, classes in chunks:
         refuse_implausible(xyz, path)
-        finite = np.isfinite(xyz)
-        if not finite.all():
-            keep = np.all(finite, axis=1)
-            dropped += len(xyz) - int(keep.sum())
+        keep = np.all(np.isfinite(xyz), axis=1)
+        if not keep.all():
+            dropped += int((~keep).sum())
             xyz, classes = select_classes(xyz, classes, keep)
         yield xyz, classes
     if dropped:
         warn(path, f"{count_things(dropped, 'point')} with NaN or infinite coordinates left out")
 
 
-def as_input_error(error: Exception, path: str | Path) -> InputError:
+def as_input_error(error: Exception, path: FilePath) -> InputError:
     """Turn an exception of reading a file into its InputError, so that others go on."""
     if isinstance(error, InputError):
         return error
@@ -190,7 +186,7 @@ def as_input_error(error: Exception, path: str | Path) -> InputError:
     )
 
 
-def refuse_implausible(xyz: np.ndarray, path: str | Path) -> None:
+def refuse_implausible(xyz: np.ndarray, path: FilePath) -> None:
     """Raise InputError for finite coordinates (n, 3) that no place on Earth has."""
     if not len(xyz) or is_plausible(compute_bounds(xyz)).all():
         return
@@ -203,7 +199,7 @@ def refuse_implausible(xyz: np.ndarray, path: str | Path) -> None:
         )
 
 
-def read_header(path: str | Path) -> PointFileHeader:
+def read_header(path: FilePath) -> PointFileHeader:
     """Return bounds, count and CRS by a header of LAS, LAZ, COPC, or a pass over others."""
     header = las_file_header(path)
     if header is not None:
@@ -222,7 +218,7 @@ def list_boxes(headers: list[PointFileHeader]) -> np.ndarray:
     return np.array([header.bounds for header in headers], float).reshape(-1, 6)[:, [0, 1, 3, 4]]
 
 
-def las_file_header(path: str | Path) -> PointFileHeader | None:
+def las_file_header(path: FilePath) -> PointFileHeader | None:
     """Return the header of a LAS, LAZ or COPC file, None for another kind."""
     if file_kind(path) != "las":
         return None
@@ -243,37 +239,24 @@ def find_steps(xyz: np.ndarray) -> tuple[float, float]:
     (0.5, 0.0)
     """
     minimum, limit = STEP_POINTS
-    gap = xyz[:limit] - xyz[:1]
     if len(xyz) < minimum:
         return 0.0, 0.0
-
-    def find_step(values: np.ndarray) -> float:
-        return next(
-            (
-                step
-                for step in STEPS
-                if np.allclose(values, step * np.rint(values / step), rtol=0, atol=1e-4)
-            ),
-            0.0,
-        )
-
-    return find_step(gap[:, :2]), find_step(gap[:, 2])
+    result = []
+    for gap in np.split(xyz[:limit] - xyz[:1], [2], axis=1):
+        steps = (s for s in STEPS if np.allclose(gap, s * np.rint(gap / s), rtol=0, atol=1e-4))
+        result.append(next(steps, 0.0))
+    return result[0], result[1]
 
 
 def warn_coarse(headers: list[PointFileHeader], units: Units) -> None:
     """Warn once of coordinates (in `units`) in steps over COARSE_M, as roofs are no finer."""
     coarse = {}
     for header in headers:
-        plan_m, height_m = header.steps[0] * units.plan, header.steps[1] * units.height
-        phrases = [
-            f"{m:.3g} m in {way}"
-            for m, way in ((plan_m, "plan"), (height_m, "height"))
-            if m > COARSE_STEP_M
-        ]
+        ways = ("plan", header.steps[0] * units.plan), ("height", header.steps[1] * units.height)
+        phrases = [f"{m:.3g} m in {way}" for way, m in ways if m > COARSE_STEP_M]
         if phrases:
             coarse[header.path] = " and ".join(phrases)
-    if coarse:
-        path, steps = next(iter(coarse.items()))
+    for path, steps in list(coarse.items())[:1]:
         warn(
             f"{path}{format_others(list(coarse))}",
             f"coordinates come in steps of {steps}, and roofs "
@@ -281,20 +264,20 @@ def warn_coarse(headers: list[PointFileHeader], units: Units) -> None:
         )
 
 
-def expand_paths(paths: tuple[str | Path, ...]) -> list[str | Path]:
+def expand_paths(paths: tuple[FilePath, ...]) -> list[FilePath]:
     """Return the files of paths, (sorted) folders and wildcards, each once, in order."""
     if not paths:
         raise InputError(
             "expected at least one point cloud, got none; name a file, a folder or a wildcard"
         )
-    files: dict[str, str | Path] = {}
+    files: dict[str, FilePath] = {}
     for path in paths:
         for file in expand_path(path):
             files.setdefault(locate(file), file)
     return list(files.values())
 
 
-def expand_path(path: str | Path) -> list[str | Path]:
+def expand_path(path: FilePath) -> list[FilePath]:
     if is_url(path):
         return [path]
     folder = Path(path)
@@ -319,22 +302,21 @@ def expand_path(path: str | Path) -> list[str | Path]:
     return [Path(match) for match in matches]
 
 
-def drop_other_text(files: list[Path]) -> list[str | Path]:
+def drop_other_text(files: list[Path]) -> list[FilePath]:
     """Drop the text files of a folder without points, such as notes, if others are there."""
-    points = [
+    others = [
         file
         for file in files
-        if file.suffix.lower() not in TEXT_SUFFIXES or text.is_of_points(file)
+        if file.suffix.lower() in TEXT_SUFFIXES and not text.is_of_points(file)
     ]
-    if not points:
+    if not 0 < len(others) < len(files):
         return list(files)
-    if len(points) < len(files):
-        remainder = ", ".join(file.name for file in files if file not in points)
-        warn(files[0].parent, f"text without points is left aside: {remainder}")
-    return list(points)
+    remainder = ", ".join(file.name for file in others)
+    warn(files[0].parent, f"text without points is left aside: {remainder}")
+    return [file for file in files if file not in others]
 
 
-def file_kind(path: str | Path) -> str:
+def file_kind(path: FilePath) -> str:
     """Return one of READERS, by the first bytes, else by the ending.
 
     Raises InputError for anything else. An address is not opened for it: it goes by its ending, and
@@ -378,13 +360,16 @@ def common_crs(crs_of: dict[str, Any], arguments: Any = None, unit: str = "auto"
     InputError, naming both files, where two disagree, and for a CRS that cannot be understood while
     neither `arguments` nor a `unit` stands in for it.
     """
-    if arguments is None and unit == "auto":
-        refuse_unknown(crs_of)
-    named_crs = {
-        path: crs
-        for path, crs in crs_of.items()
-        if crs is not None and not isinstance(crs, UnknownCRS)
-    }
+    named_crs = {}
+    for path, crs in crs_of.items():
+        if not isinstance(crs, UnknownCRS | None):
+            named_crs[path] = crs
+        elif crs is not None and arguments is None and unit == "auto":
+            # its unit might be any
+            raise InputError(
+                f"expected a coordinate reference system that PROJ understands in {path}, got "
+                f"{crs.reason}; name the right one with --crs, or its unit alone with --unit"
+            )
     if arguments is not None:
         overruled = [path for path, crs in named_crs.items() if not same_horizontal(crs, arguments)]
         if overruled:
@@ -406,23 +391,13 @@ def common_crs(crs_of: dict[str, Any], arguments: Any = None, unit: str = "auto"
     return max(named_crs.values(), key=lambda crs: vertical_crs(crs) is not None, default=None)
 
 
-def refuse_unknown(crs_of: dict[str, Any]) -> None:
-    """Raise InputError where a file's CRS cannot be understood: its unit might be any."""
-    for path, crs in crs_of.items():
-        if isinstance(crs, UnknownCRS):
-            raise InputError(
-                f"expected a coordinate reference system that PROJ understands in {path}, got "
-                f"{crs.reason}; name the right one with --crs, or its unit alone with --unit"
-            )
-
-
-def refuse_other_crs(files: list[str | Path], crs: Any, source: str) -> None:
+def refuse_other_crs(files: list[FilePath], crs: Any, source: str) -> None:
     """Raise InputError where a file names another CRS than `crs`, which `source` named."""
     for file in files if crs is not None else ():
         header = las_file_header(file)  # text and PLY never name a CRS
-        if header is None or isinstance(header.crs, UnknownCRS) or not names_place(header.crs):
-            continue
-        refuse_two(crs, source, header.crs, str(file))
+        other = None if header is None else header.crs
+        if not isinstance(other, UnknownCRS) and names_place(other):
+            refuse_two(crs, source, other, str(file))
 
 
 def refuse_two(first: Any, first_source: str, second: Any, second_source: str) -> None:
@@ -439,7 +414,7 @@ def format_others(paths: list[str]) -> str:
     return f" and {len(paths) - 1} more" if len(paths) > 1 else ""
 
 
-def joined_classes(clouds: list[PointCloud]) -> np.ndarray | None:
+def join_classes(clouds: list[PointCloud]) -> np.ndarray | None:
     """Return all clouds' classes, 0 for a file without, None where no file has any."""
     if all(cloud.classification is None for cloud in clouds):
         return None

@@ -5,23 +5,21 @@ from __future__ import annotations
 import io
 import warnings
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import islice
-from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from ...errors import InputError
 from ...log import count_things
 from ..names import READING
-from ..remote import open_binary
+from ..remote import FilePath, open_binary
 from .las import Chunk
 
 COMMENTS = ("#", "//")
 
 
-@dataclass(frozen=True)
-class TextLayout:
+class TextLayout(NamedTuple):
     """A text file of points: lines to skip, delimiter (None: space), columns x, y, z, class."""
 
     skip: int
@@ -29,7 +27,7 @@ class TextLayout:
     columns: tuple[int, ...]
 
 
-def text_chunks(path: str | Path, chunk_points: int) -> Iterator[Chunk]:
+def text_chunks(path: FilePath, chunk_points: int) -> Iterator[Chunk]:
     """Yield the points of a text file; InputError names the first line without one."""
     layout = sniff(path)
     read = 0
@@ -42,13 +40,12 @@ def text_chunks(path: str | Path, chunk_points: int) -> Iterator[Chunk]:
             table = parse_rows(file, layout, chunk_points, path, read)
             read += len(table)
             if len(table):
-                # in one piece, as from other files: what is compiled for these takes it
-                yield np.ascontiguousarray(table[:, :3]), read_classes(table)
+                yield as_chunk(table)
             if len(table) < chunk_points:
                 return
 
 
-def parse_rows(file, layout: TextLayout, count: int, path: str | Path, read: int) -> np.ndarray:
+def parse_rows(file, layout: TextLayout, count: int, path: FilePath, read: int) -> np.ndarray:
     try:
         with warnings.catch_warnings():
             # NumPy warns of an empty rest, which is the normal end
@@ -69,13 +66,16 @@ def parse_rows(file, layout: TextLayout, count: int, path: str | Path, read: int
         ) from error
 
 
-def read_classes(table: np.ndarray) -> np.ndarray | None:
+def as_chunk(table: np.ndarray) -> Chunk:
+    """Return the points of a table of x, y, z and, where there is one, class."""
+    # in one piece, as from other files: what is compiled for these takes it
+    xyz = np.ascontiguousarray(table[:, :3])
     if table.shape[1] < 4:
-        return None
-    return np.clip(np.nan_to_num(table[:, 3]), 0, 255).astype(np.uint8)
+        return xyz, None
+    return xyz, np.clip(np.nan_to_num(table[:, 3]), 0, 255).astype(np.uint8)
 
 
-def sniff(path: str | Path) -> TextLayout:
+def sniff(path: FilePath) -> TextLayout:
     """Find the layout by the first lines; InputError without text or three numbers."""
     with open_binary(path) as file:
         head = file.read(65536)
@@ -118,7 +118,7 @@ def sniff(path: str | Path) -> TextLayout:
     )
 
 
-def is_of_points(path: str | Path) -> bool:
+def is_of_points(path: FilePath) -> bool:
     """Return whether the first lines of a text file are points."""
     try:
         sniff(path)

@@ -33,6 +33,7 @@ from ..crs import (
 )
 from ..names import READING
 from ..plausible import HIGHEST_LAND_M, LOWEST_LAND_M
+from ..remote import FilePath
 from .raster_checks import band_unit, choose_bands, read_scaling, refuse_without_position
 
 TILE_PX = 512  # Side (pixels) of what is read at once. GeoTIFFs are often stored in such tiles.
@@ -69,7 +70,7 @@ class RasterTerrain:
     pixels with heights these count alone, amid others the answer is NaN.
     """
 
-    def __init__(self, path: str | Path, crs: Any = None, units: Units | None = None):
+    def __init__(self, path: FilePath, crs: Any = None, units: Units | None = None):
         """Open `path`, to be queried in world metres of `crs`.
 
         None is for the raster's own CRS. Raises InputError. `units` are those of `crs`, which need
