@@ -23,7 +23,7 @@ import shapely
 from ...errors import InputError
 from ...extras import import_extra
 from ...masking import mask, remember
-from .polygons import Features, as_polygons, decode_geometry
+from .polygons import Features, decode_geometries
 
 TIMEOUT_S = 10  # to reach a server; libpq would wait for minutes
 SCHEMES = ("postgresql", "postgres")
@@ -44,23 +44,19 @@ def read_table(source: str, where: str | None = None) -> Features:
     the geometry column cannot be used.
     """
     with open_source(source, where) as table:
-        rows = list(table.rows())
+        rows = table.rows()
     if not rows:
         raise InputError(
             f"expected footprints in {table.name}, got a table without rows; name another, or "
             "relax the condition"
         )
-    srids = {shapely.get_srid(shape) for shape, _ in rows if shape is not None}
-    names = sorted({name for _, attributes in rows for name in attributes})
-    columns = [np.array([attributes.get(name) for _, attributes in rows], object) for name in names]
-    geometries = np.empty(len(rows), object)
-    geometries[:] = [shape for shape, _ in rows]
-    return (
-        {"fields": names, "crs": find_crs(srids, table.name)},
-        np.arange(len(rows)),
-        geometries,
-        columns,
-    )
+    wkb, attributes = zip(*rows, strict=True)
+    geometries = decode_geometries(wkb)
+    names = sorted({name for row in attributes for name in row})
+    columns = [np.array([row.get(name) for row in attributes], object) for name in names]
+    srids = set(shapely.get_srid(geometries).tolist())
+    meta = {"fields": names, "crs": find_crs(srids, table.name)}
+    return meta, np.arange(len(rows)), geometries, columns
 
 
 def table_crs(source: str) -> str | None:
@@ -70,13 +66,13 @@ def table_crs(source: str) -> str | None:
 
 
 def find_crs(srids: set[int], table: str) -> str | None:
-    known_srids = srids - {0}
-    if len(known_srids) > 1:
+    srids = srids - {-1, 0}  # of no geometry, and unknown
+    if len(srids) > 1:
         raise InputError(
-            f"expected one reference system in {table}, got SRIDs {sorted(known_srids)}; choose "
+            f"expected one reference system in {table}, got SRIDs {sorted(srids)}; choose "
             "rows with &where="
         )
-    return f"EPSG:{known_srids.pop()}" if known_srids else None
+    return f"EPSG:{srids.pop()}" if srids else None
 
 
 @dataclass(frozen=True)
@@ -101,25 +97,19 @@ class DatabaseTable:
         # each
         self.cursor.execute(sql.SQL(text).format(t=table, **names), binary=True)
 
-    def rows(self) -> Iterator[tuple]:
-        """Yield each row's geometry (or None) and attributes, ordered by content."""
-        self.query(
-            "select ST_AsEWKB(ST_CurveToLine({g})) as ewkb, (select to_jsonb(a) from (select {c}) "
-            "a) as attributes from {t} order by 2, 1",
-            self.list_columns(),
-        )
-        for ewkb, attributes in self.cursor:
-            yield (
-                (decode_geometry(as_polygons(bytes(ewkb))) if ewkb is not None else None),
-                attributes,
-            )
-
-    def list_columns(self) -> list[str]:
-        """Return the columns that hold no geometries, of which PostGIS makes no JSON."""
+    def rows(self) -> list[tuple]:
+        """Return each row's geometry (WKB or None) and attributes, ordered by content."""
+        # PostGIS makes no JSON of geometries
         self.cursor.execute("select oid from pg_type where typname in ('geometry', 'geography')")
         shapes = {oid for (oid,) in self.cursor}
         self.query("select * from {t} limit 0")
-        return [column.name for column in self.cursor.description if column.type_code not in shapes]
+        names = [one.name for one in self.cursor.description if one.type_code not in shapes]
+        self.query(
+            "select ST_AsEWKB(ST_CurveToLine({g})) as ewkb, (select to_jsonb(a) from (select {c}) "
+            "a) as attributes from {t} order by 2, 1",
+            names,
+        )
+        return self.cursor.fetchall()
 
     def srids(self) -> set[int]:
         self.query("select distinct ST_SRID({g}) from {t}")

@@ -76,15 +76,9 @@ def read_footprints(
     geometries = transform_geometries(geometries, source, target, path)
     units = find_units(target or source, f"the footprints of {path}", read.unit)
     geometries = geometries if units.are_metres else shapely.transform(geometries, units.to_metres)
-    footprints = tuple(
-        unique_ids(split_features(ids, geometries, surfaces, attributes, path), path)
-    )
+    footprints = unique_ids(split_features(ids, geometries, surfaces, attributes, path), path)
     warn_overlaps(footprints, path)
-    return (
-        footprints
-        if bbox is None
-        else tuple(f for f in footprints if meets(f.polygon, bbox, units))
-    )
+    return tuple(f for f in footprints if bbox is None or meets(f.polygon, bbox, units))
 
 
 def meets(polygon: shapely.Polygon, bbox: Box, units: Units) -> bool:
@@ -135,7 +129,19 @@ def read_features(
         path, layer, where, lambda crs: bbox and box_in(plan_crs(crs, path), bbox, bbox_crs)
     )
     meta, _, geometries, _ = features
-    refuse_nothing(path, len(geometries), meta["total_bounds"], where, bbox)
+    chosen = " and ".join(name for name, by in (("--where", where), ("--bbox", bbox)) if by)
+    if not len(geometries) and chosen:
+        bounds = meta["total_bounds"]
+        lies = "" if bounds is None else f" ({format_box(bounds)})"
+        raise InputError(
+            f"expected footprints in {path}{lies} that {chosen} let through, got none; relax or "
+            "leave out what does not fit"
+        )
+    if not len(geometries):
+        raise InputError(
+            f"expected footprints in {path}, got a layer without features; name another file or "
+            "layer"
+        )
     kinds = {g.geom_type for g in geometries if g is not None}
     if kinds and not any("Polygon" in kind or kind == "GeometryCollection" for kind in kinds):
         raise InputError(
@@ -143,28 +149,6 @@ def read_features(
             "close the lines first"
         )
     return features
-
-
-def refuse_nothing(
-    path: FilePath,
-    count: int,
-    bounds: Sequence[float] | None,
-    where: str | None,
-    bbox: Box | None,
-) -> None:
-    """Raise InputError for no features: an empty layer, or a condition or box lets none in."""
-    if count:
-        return
-    if where or bbox:
-        text = " and ".join(name for name, value in (("--where", where), ("--bbox", bbox)) if value)
-        lies = "" if bounds is None else f" ({format_box(bounds)})"
-        raise InputError(
-            f"expected footprints in {path}{lies} that {text} let through, got none; relax or "
-            "leave out what does not fit"
-        )
-    raise InputError(
-        f"expected footprints in {path}, got a layer without features; name another file or layer"
-    )
 
 
 def box_in(crs: CRS | None, bbox: Box, bbox_crs: CRS | None) -> Box:
@@ -180,23 +164,20 @@ def feature_ids(
     rows: list[dict[str, Any]], numbers: np.ndarray, id_attribute: str | None, path: FilePath
 ) -> list[str]:
     """Return features' ids as text: of the requested or a usual attribute, else numbers."""
-    by_number = [str(number) for number in numbers]
+    by_number = list(map(str, numbers))
     names = {name.lower(): name for row in rows for name in row}
     if id_attribute is not None:
-        name = (
-            id_attribute
-            if any(id_attribute in row for row in rows)
-            else names.get(id_attribute.lower())
-        )
+        name = names.get(id_attribute.lower())
         if name is None:
             raise InputError(
                 f"expected the attribute {id_attribute!r} in {path}, got "
                 f"{', '.join(names.values()) or 'none at all'}; "
                 "name one of these with --id-attribute"
             )
+        if any(id_attribute in row for row in rows):  # which may have others in other letters
+            name = id_attribute
         ids = [id_text(row.get(name)) for row in rows]
-        missing = ids.count("")
-        if missing:
+        if missing := ids.count(""):
             warn(
                 path,
                 f"{count_things(missing, 'feature')} without {name}; the number stands in for it",
@@ -239,17 +220,15 @@ def transform_geometries(
     if source is None or target is None or same_horizontal(source, target):
         return geometries
     if not names_place(source):
-        accepted = (
+        warn(
+            path,
             f"names a local CRS, {describe_crs(source)}; taken to be in the cloud's, "
-            f"{describe_crs(target)}"
+            f"{describe_crs(target)}",
         )
-        warn(path, accepted)
         return shapely.transform(geometries, lambda xy: xy * compare_units(source, target))
     transformer = make_transformer(source, target)
     warn_if_coarse(find_operation(str(path), source, target, find_middle(geometries)))
-    moved = shapely.transform(
-        geometries, lambda xy: np.column_stack(transformer.transform(xy[:, 0], xy[:, 1]))
-    )
+    moved = shapely.transform(geometries, lambda xy: np.column_stack(transformer.transform(*xy.T)))
     if not np.isfinite(shapely.get_coordinates(moved)).any():
         advice = "check which CRS each file names"
         if source.is_geographic:
@@ -295,27 +274,27 @@ def split_features(
         empty += polygons[0].is_empty
         if len(polygons) == 1:
             footprints.append(Footprint(id, polygons[0], row))
-        else:
-            split.append(len(polygons))
-            parts = enumerate(polygons, start=1)
-            footprints += [
-                Footprint(f"{id}-{number}", polygon, {**row, "part_of": id})
-                for number, polygon in parts
-            ]
-    if split:
-        many = count_things(len(split), "feature") + " of several polygons"
-        warn(path, f"{many} became {sum(split)} buildings, named by its id and -1, -2, ...")
-    if surfaces.any():
-        bodies = count_things(int(surfaces.sum()), "feature") + " of faces in space"
-        warn(path, f"{bodies}; the area that they cover from above is the outline")
-    if mended:
-        warn(path, f"{count_things(mended, 'invalid footprint')} repaired")
-    if empty:
-        warn(
-            path,
-            f"{count_things(empty, 'feature')} with no area that a building could have; "
-            "such get no model, but a status",
-        )
+            continue
+        split.append(len(polygons))
+        for number, polygon in enumerate(polygons, start=1):
+            footprints.append(Footprint(f"{id}-{number}", polygon, {**row, "part_of": id}))
+    several = f"became {sum(split)} buildings, named by its id and -1, -2, ..."
+    for count, thing, what in (
+        (len(split), "feature", f" of several polygons {several}"),
+        (
+            int(surfaces.sum()),
+            "feature",
+            " of faces in space; the area that they cover from above is the outline",
+        ),
+        (mended, "invalid footprint", " repaired"),
+        (
+            empty,
+            "feature",
+            " with no area that a building could have; such get no model, but a status",
+        ),
+    ):
+        if count:
+            warn(path, f"{count_things(count, thing)}{what}")
     return footprints
 
 
@@ -324,7 +303,7 @@ def unique_ids(footprints: Sequence[Footprint], path: FilePath) -> list[Footprin
     ids = {footprint.id for footprint in footprints}
     in_use: set[str] = set()
     result: list[Footprint] = []
-    copies = renamed = 0
+    renamed = 0
     originals = find_copies(np.array([footprint.polygon for footprint in footprints]))
     for number, footprint in enumerate(footprints):
         id, suffix = footprint.id, 2
@@ -334,20 +313,14 @@ def unique_ids(footprints: Sequence[Footprint], path: FilePath) -> list[Footprin
         in_use.add(id)
         attributes = footprint.attributes
         if number in originals:
-            attributes, copies = {**attributes, "copy_of": result[originals[number]].id}, copies + 1
+            attributes = {**attributes, "copy_of": result[originals[number]].id}
         result.append(Footprint(id, footprint.polygon, attributes))
-    if renamed:
-        warn(
-            path,
-            f"{count_things(renamed, 'footprint')} with the id of an earlier one got a "
-            "suffix such as _2",
-        )
-    if copies:
-        warn(
-            path,
-            f"{count_things(copies, 'footprint')} with the polygon of another; see the "
-            "attribute copy_of",
-        )
+    for count, what in (
+        (renamed, "with the id of an earlier one got a suffix such as _2"),
+        (len(originals), "with the polygon of another; see the attribute copy_of"),
+    ):
+        if count:
+            warn(path, f"{count_things(count, 'footprint')} {what}")
     return result
 
 
@@ -365,10 +338,9 @@ def find_copies(polygons: np.ndarray) -> dict[int, int]:
     second, original = pairs[:, pairs[0] > pairs[1]]
     apart = shapely.area(shapely.symmetric_difference(polygons[second], polygons[original]))
     is_copy = apart <= SAME_M * shapely.length(polygons[second])
-    order = np.lexsort([-original[is_copy], second[is_copy]])
-    return dict(
-        zip(second[is_copy][order].tolist(), original[is_copy][order].tolist(), strict=True)
-    )
+    # the first comes last, and stays
+    copies = zip(second[is_copy].tolist(), original[is_copy].tolist(), strict=True)
+    return dict(sorted(copies, reverse=True))
 
 
 def warn_overlaps(footprints: Sequence[Footprint], path: FilePath) -> None:

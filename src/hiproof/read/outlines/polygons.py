@@ -6,6 +6,7 @@ Surfaces in WKB that GEOS does not know become collections of polygons.
 from __future__ import annotations
 
 import struct
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -154,23 +155,16 @@ AS_POLYGONS = {POLYHEDRAL_SURFACE: MULTI_POLYGON, TIN: MULTI_POLYGON, TRIANGLE: 
 Z_FLAG, M_FLAG, SRID_FLAG = 1 << 31, 1 << 30, 1 << 29
 
 
-def decode_geometries(wkb: np.ndarray) -> np.ndarray:
+def decode_geometries(wkb: Iterable[bytes | None]) -> np.ndarray:
     """Return geometries (n,) of WKB (n,), unclosed rings closed, None if unreadable."""
-    decoded = np.array(
-        [as_polygons(body) if body is not None else None for body in wkb], dtype=object
-    )
+    bodies = [body and as_polygons(body) for body in wkb]
+    geometries = np.empty(len(bodies), object)
     try:
-        return shapely.from_wkb(decoded, on_invalid="fix")
+        geometries[:] = shapely.from_wkb(np.array(bodies, object), on_invalid="fix")
     except (shapely.errors.ShapelyError, NotImplementedError, ValueError):
-        return np.array([decode_geometry(body) for body in decoded], dtype=object)
-
-
-def decode_geometry(body: bytes | None) -> shapely.Geometry | None:
-    """Decode one geometry, None where it cannot be read."""
-    try:
-        return shapely.from_wkb(body, on_invalid="fix")
-    except (shapely.errors.ShapelyError, NotImplementedError, ValueError):
-        return None
+        if len(bodies) > 1:
+            geometries[:] = [decode_geometries([body])[0] for body in bodies]
+    return geometries
 
 
 def as_polygons(body: bytes) -> bytes:
@@ -181,40 +175,33 @@ def as_polygons(body: bytes) -> bytes:
     >>> shapely.from_wkb(as_polygons(bytes(body))).geom_type
     'Polygon'
     """
-    if len(body) < 5 or decode_kind(body, 0)[1] not in {*AS_POLYGONS, COLLECTION}:
-        return body
     renamed = bytearray(body)
     try:
         rename(renamed, 0)
-    except (struct.error, IndexError):  # cut short
+    except (struct.error, IndexError):  # cut short, or of a kind without points in a row
         return body
     return bytes(renamed)
 
 
-def decode_kind(body: bytes | bytearray, position: int) -> tuple[str, int, int, int]:
-    """Return byte order, kind, dimensions and content's place of the geometry at `position`."""
-    order = "<" if body[position] else ">"
-    (code,) = struct.unpack_from(f"{order}I", body, position + 1)
-    iso, kind = divmod(code & ~(Z_FLAG | M_FLAG | SRID_FLAG), 1000)
-    has_z, has_m = bool(code & Z_FLAG) or iso in (1, 3), bool(code & M_FLAG) or iso in (2, 3)
-    return order, kind, 2 + has_z + has_m, position + (9 if code & SRID_FLAG else 5)
-
-
 def rename(body: bytearray, position: int) -> int:
     """Rename the surfaces within the geometry at byte `position`; the byte after it."""
-    order, kind, dimensions, start = decode_kind(body, position)
-    (code,) = struct.unpack_from(f"{order}I", body, position + 1)
-    struct.pack_into(f"{order}I", body, position + 1, code - kind + AS_POLYGONS.get(kind, kind))
+    number = struct.Struct("<I" if body[position] else ">I")
+    (code,) = number.unpack_from(body, position + 1)
+    iso, kind = divmod(code & ~(Z_FLAG | M_FLAG | SRID_FLAG), 1000)
+    if kind > COLLECTION and kind not in AS_POLYGONS:
+        raise IndexError(f"no geometry of points, lines and polygons: {kind}")
+    number.pack_into(body, position + 1, code - kind + AS_POLYGONS.get(kind, kind))
+    has_z, has_m = bool(code & Z_FLAG) or iso in (1, 3), bool(code & M_FLAG) or iso in (2, 3)
+    point_bytes, start = 8 * (2 + has_z + has_m), position + (9 if code & SRID_FLAG else 5)
     if kind == POINT:
-        return start + 8 * dimensions
-    (count,) = struct.unpack_from(f"{order}I", body, start)
+        return start + point_bytes
+    (count,) = number.unpack_from(body, start)
     start += 4
     if kind == LINE_TYPE:
-        return start + 8 * dimensions * count
+        return start + point_bytes * count
     for _ in range(count):
         if kind in (POLYGON_TYPE, TRIANGLE):
-            (points,) = struct.unpack_from(f"{order}I", body, start)
-            start += 4 + 8 * dimensions * points
+            start += 4 + point_bytes * number.unpack_from(body, start)[0]
         else:
             start = rename(body, start)
     return start

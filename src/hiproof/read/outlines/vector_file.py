@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
+from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 import pyogrio
@@ -56,7 +56,7 @@ def read_layer(
         for name, kind, column in zip(meta["fields"], meta["dtypes"], columns, strict=True)
     }
     values |= {name: read_text(name) for name in odd}
-    names = [name for name in fields if name in values] if odd else list(values)
+    names = list(fields if odd else values)
     return {**meta, "fields": names}, numbers, wkb, [values[name] for name in names], odd
 
 
@@ -76,16 +76,15 @@ def column_as_text(
 ) -> np.ndarray:
     """Return an attribute (n,) of these features as text, broken UTF-8 replaced."""
     layer_name = pyogrio.read_info(path, layer=layer)["layer_name"]
-    source = virtual_layer(path, layer_name, text=name)
+    # one attribute alone, as text
+    source = virtual_layer(path, layer_name, f'<Field name={quoteattr(name)} type="String"/>')
     try:
-        _, _, _, columns = pyogrio.raw.read(
+        _, _, _, (values,) = pyogrio.raw.read(
             source, fids=numbers, read_geometry=False, encoding="latin-1"
         )
     except (*READ_ERRORS, DataSourceError, FeatureError):
-        columns = []
-    if not columns:
-        return np.full(len(numbers), None, dtype=object)
-    return np.array([tidy_value(value) for value in columns[0]], dtype=object)
+        values = [None] * len(numbers)
+    return np.array([tidy_value(value) for value in values], dtype=object)
 
 
 def tidy_value(value: str | None) -> str | None:
@@ -96,11 +95,7 @@ def tidy_value(value: str | None) -> str | None:
     """
     if value is None:
         return None
-    body = value.encode("latin-1", "replace")
-    try:
-        text = body.decode()
-    except UnicodeDecodeError:
-        text = body.decode("utf-8", "replace")
+    text = value.encode("latin-1", "replace").decode("utf-8", "replace")
     return SLASHED_DATE.sub(r"\1-\2-\3", text)
 
 
@@ -120,34 +115,17 @@ def list_layers(path: str) -> list[tuple[str, str | None]]:
     return list(zip(names.tolist(), kinds.tolist(), strict=True))
 
 
-def find_source(path: str, layer: str | int | None) -> tuple[str, str | int | None]:
-    """Return what pyogrio can open in place of `path`, and the layer there."""
-    try:
-        pyogrio.read_info(path, layer=layer)
-    except GeometryError:
-        names = [name for name, _ in list_layers(path)]
-        name = names[layer or 0] if not isinstance(layer, str) else layer
-        return virtual_layer(path, name, geometry="wkbUnknown"), None
-    return path, layer
+def virtual_layer(path: str, layer: str, declared: str) -> str:
+    """Return GDAL's virtual format of one layer with what is `declared` of it, in XML.
 
-
-def virtual_layer(path: str, layer: str, geometry: str = "", text: str = "") -> str:
-    """Return GDAL's virtual format of one layer.
-
-    The layer's `geometry` is declared anew, or it has one attribute alone, as text. `path` may be
-    what this function made.
+    `path` may be what this function made.
     """
-    if path.startswith("<"):
-        root = ElementTree.fromstring(path)
-        path = root.findtext(".//SrcDataSource", "")
-    root = ElementTree.Element("OGRVRTDataSource")
-    of_layer = ElementTree.SubElement(root, "OGRVRTLayer", name=layer)
-    ElementTree.SubElement(of_layer, "SrcDataSource").text = vsi_path(path)
-    if geometry:
-        ElementTree.SubElement(of_layer, "GeometryType").text = geometry
-    if text:
-        ElementTree.SubElement(of_layer, "Field", name=text, type="String")
-    return ElementTree.tostring(root, encoding="unicode")
+    source = path if path.startswith("<") else vsi_path(path)
+    return (
+        f"<OGRVRTDataSource><OGRVRTLayer name={quoteattr(layer)}>"
+        f"<SrcDataSource>{escape(source)}</SrcDataSource>{declared}"
+        "</OGRVRTLayer></OGRVRTDataSource>"
+    )
 
 
 def read_features(
@@ -187,8 +165,14 @@ def open_layer(
 ) -> tuple[str, str | int | None, dict[str, Any]]:
     """Return what pyogrio can open in place of `path`, the layer there, and its metadata."""
     with translate_read_errors(path):
-        source, layer = find_source(str(path), choose_layer(path, layer))
-        return source, layer, pyogrio.read_info(source, layer=layer)
+        source, layer = str(path), choose_layer(path, layer)
+        try:
+            return source, layer, pyogrio.read_info(source, layer=layer)
+        except GeometryError:
+            names = [name for name, _ in list_layers(source)]
+            name = layer if isinstance(layer, str) else names[layer or 0]
+            source = virtual_layer(source, name, "<GeometryType>wkbUnknown</GeometryType>")
+            return source, None, pyogrio.read_info(source)
 
 
 def choose_layer(path: FilePath, layer: str | int | None) -> str | int | None:
