@@ -33,6 +33,11 @@ class SquareCells:
         np.maximum.at(table, self.index, values)
         return table.reshape(self.shape)
 
+    def bottom(self, values: np.ndarray) -> np.ndarray:
+        """Return a table of the smallest of the `values` (n,) in each cell, NaN else."""
+        table = -self.top(-values)
+        return np.where(np.isfinite(table), table, np.nan)
+
     def highest(self, values: np.ndarray, selection: np.ndarray) -> np.ndarray:
         """Return a table of the largest value in each cell and those around it.
 

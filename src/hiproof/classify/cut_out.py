@@ -38,17 +38,15 @@ def is_cut_out(xyz: np.ndarray) -> bool | None:
     """
     cell_m = max(CELL_M, SPACINGS_A_CELL / math.sqrt(plan_density(xyz)))
     cells = SquareCells(xyz, cell_m)
-    height = cells.top(xyz[:, 2]) - fit_plane(-cells.top(-xyz[:, 2]), cell_m)
-    ends = walls = 0
+    height = cells.top(xyz[:, 2]) - fit_plane(cells.bottom(xyz[:, 2]), cell_m)
+    borders = walls = 0
     for axis, way in ((0, 1), (0, -1), (1, 1), (1, -1)):
         next_heights = find_next_heights(height, axis, way)
         border = (height > HIGH_OBJECT_M) & (next_heights <= HIGH_OBJECT_M)
-        is_wall = np.isfinite(next_heights[border]) & (
-            height[border] - next_heights[border] > WALL_M
-        )
-        walls += int(is_wall.sum())
-        ends += int((~is_wall).sum())
-    if ends < OPEN_SHARE * (ends + walls) or roof_points(xyz).mean() <= SMOOTH_SHARE:
+        step = height[border] - next_heights[border]
+        walls += int((np.isfinite(step) & (step > WALL_M)).sum())
+        borders += len(step)
+    if borders - walls < OPEN_SHARE * borders or roof_points(xyz).mean() <= SMOOTH_SHARE:
         return False
     return True if (height > HIGH_OBJECT_M).any() else None
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from ..geometry.grid import cell_range
+from .cells import SquareCells
 
 CELL_M = 1.0  # m; a car or a bush covers a few cells, a street is some wide
 WINDOWS_M = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 11.0, 15.0, 20.0)  # half sides of the openings' windows
@@ -64,16 +64,17 @@ def ground_grid(xyz: np.ndarray, cell_m: float = CELL_M) -> GroundGrid:
     >>> float(ground_grid(points).height_at(np.array([[20.0, 20.0]]))[0])
     0.0
     """
-    first, lowest = lowest_in_cells(xyz, cell_m)
-    return GroundGrid(np.array(first) * cell_m, fill_gaps(remove_objects(lowest, cell_m)), cell_m)
+    cells = SquareCells(xyz, cell_m)
+    ground = remove_objects(cells.bottom(xyz[:, 2]), cell_m)
+    return GroundGrid(np.array(cells.first) * cell_m, fill_gaps(ground), cell_m)
 
 
 def bare_points(lowest: np.ndarray) -> np.ndarray:
     """Return the ground's points among (m, 3), which are at most one a cell."""
     lowest = lowest[~is_lone(lowest)]
-    first, table = lowest_in_cells(lowest, CELL_M)
-    column, row = (np.floor(lowest[:, :2] / CELL_M).astype(np.int64) - first).T
-    return lowest[np.isfinite(remove_objects(table, CELL_M))[column, row]]
+    cells = SquareCells(lowest, CELL_M)
+    ground = remove_objects(cells.bottom(lowest[:, 2]), CELL_M)
+    return lowest[np.isfinite(ground).ravel()[cells.index]]
 
 
 def is_lone(lowest: np.ndarray) -> np.ndarray:
@@ -86,15 +87,6 @@ def is_lone(lowest: np.ndarray) -> np.ndarray:
     near = scipy.spatial.KDTree(lowest[:, :2]).query(lowest[:, :2], NEAREST)[1]
     n_as_low = (lowest[near, 2] <= lowest[:, [2]] + PIT_M).sum(axis=1)
     return np.asarray(n_as_low <= LONE_SHARE * NEAREST)
-
-
-def lowest_in_cells(xyz: np.ndarray, cell_m: float) -> tuple[tuple[int, int], np.ndarray]:
-    """Return the lowest height of points (n, 3) in each cell (c, r) of the world's grid, or NaN."""
-    first, size = cell_range(xyz, cell_m)
-    column, row = (np.floor(xyz[:, :2] / cell_m).astype(np.int64) - first).T
-    lowest = np.full(size, np.inf)
-    np.minimum.at(lowest, (column, row), xyz[:, 2])
-    return first, np.where(np.isfinite(lowest), lowest, np.nan)
 
 
 def remove_objects(lowest: np.ndarray, cell_m: float = CELL_M) -> np.ndarray:

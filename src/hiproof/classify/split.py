@@ -9,11 +9,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 import shapely
 
 from ..errors import ErrorReport, InputError, InputWarning, report_error
 from ..frames import Box
 from ..geometry.components import label_components
+from ..geometry.grid import number_cells
 from ..log import count_things
 from ..model import PointCloud
 from ..settings import ReadSettings, Settings
@@ -285,18 +287,9 @@ def connected_groups(xy: np.ndarray, gap_m: float) -> list[np.ndarray]:
     connected where their centres are at most the gap apart; groups come in the order of their first
     cell, by rows.
     """
-    cell_m = gap_m / 2
-    cells = np.floor(np.asarray(xy, float)[:, :2] / cell_m).astype(np.int64)
-    cells -= cells.min(axis=0) - 2
-    columns = int(cells[:, 0].max()) + 3
-    occupied, cell_of = np.unique(cells[:, 1] * columns + cells[:, 0], return_inverse=True)
-    links = []
-    for right, vertical in ((1, 0), (2, 0), (-1, 1), (0, 1), (1, 1), (0, 2)):
-        targets = occupied + vertical * columns + right
-        smallest = np.minimum(np.searchsorted(occupied, targets), len(occupied) - 1)
-        first = np.flatnonzero(occupied[smallest] == targets)
-        links.append(np.column_stack([first, smallest[first]]))
-    group_of = label_components(len(occupied), np.concatenate(links).T)[cell_of]
+    cells, cell_of = number_cells(np.floor(xy[:, ::-1] / (gap_m / 2)))
+    links = scipy.spatial.KDTree(cells).query_pairs(2.0, output_type="ndarray")
+    group_of = label_components(len(cells), links.T)[cell_of]
     order = np.argsort(group_of, kind="stable")
     return np.split(order, np.cumsum(np.bincount(group_of))[:-1])
 
