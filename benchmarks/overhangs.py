@@ -24,14 +24,14 @@ from hiproof.compose import check_solid
 from hiproof.compose.eaves import widen_roof
 from hiproof.fit.overhang import group_by_axis
 from hiproof.geometry.outline_edges import list_outline_edges
-from hiproof.geometry.rings import ring_normal
-from hiproof.model import Building, Face, Roof, Solid
+from hiproof.model import Building, Roof
 from hiproof.settings import Settings
 from hiproof.simulate import ScanSettings, random_building
 from hiproof.simulate.compounds import random_compound
 from hiproof.simulate.roofs import SimBuilding
 from hiproof.simulate.scanner import scan_scene
 from hiproof.simulate.scene import Defects, building_bodies, make_scene, trees
+from hiproof.write.meshes.triangles import faces_triangles
 
 from .tables import FigureTable, make_parser
 
@@ -51,7 +51,6 @@ class OverhangTally:
     false: int = 0
     left_out: int = 0
     invalid: int = 0
-    seconds: list[float] = field(default_factory=list)
 
 
 def draw_house(rng: np.random.Generator, is_compound: bool) -> tuple[SimBuilding, np.ndarray]:
@@ -107,26 +106,11 @@ def is_valid(building: Building) -> bool:
     """Return whether the solid with overhangs is valid, also to trimesh."""
     solid = building.model.finest_solid
     solid = solid.move(-np.floor(solid.vertices.min(axis=0)))
-    triangles = np.concatenate([triangulate_face(solid, face) for face in solid.faces])
-    mesh = trimesh.Trimesh(**trimesh.triangles.to_kwargs(triangles))
+    triangles = np.concatenate(faces_triangles(solid.vertices, solid.faces))
+    mesh = trimesh.Trimesh(solid.vertices, triangles, process=False)
     is_closed = mesh.is_watertight and mesh.is_winding_consistent
     keeps_volume = is_closed and np.isclose(mesh.volume, solid.volume, rtol=1e-3)
     return bool(keeps_volume) and not check_solid(solid)
-
-
-def triangulate_face(solid: Solid, face: Face) -> np.ndarray:
-    """Return the triangles (t, 3, 3) of a face, by GEOS over its widest projection."""
-    outer, *holes = (solid.vertices[list(ring)] for ring in face.rings)
-    normal = ring_normal(outer)
-    axes = np.delete(np.arange(3), np.abs(normal).argmax())
-    place = {tuple(xyz[axes]): xyz for ring in (outer, *holes) for xyz in ring}
-    polygon = shapely.Polygon(outer[:, axes], [hole[:, axes] for hole in holes])
-    parts = shapely.get_parts(shapely.constrained_delaunay_triangles(polygon))
-    corners = [[place[tuple(xy)] for xy in shapely.get_coordinates(t)[:3]] for t in parts]
-    triangles = np.array(corners)
-    turn = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]) @ normal
-    triangles[turn < 0] = triangles[turn < 0][:, ::-1]
-    return triangles
 
 
 def main() -> None:

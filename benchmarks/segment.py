@@ -21,7 +21,7 @@ from hiproof.segment.scores import Scores
 from hiproof.settings import Settings
 from hiproof.simulate import ROOF_TYPES
 
-from .samples import training_sample
+from .samples import draw_sample
 from .tables import FigureTable, make_parser
 
 TYPES = ROOF_TYPES
@@ -87,10 +87,8 @@ def simulate_samples(
     """Yield (type, points) of `count` buildings at one density."""
     for index in range(count):
         rng = np.random.default_rng([seed, int(10 * density), index])
-        points, _, type = training_sample(
-            rng, TYPES, n_points=(30, 3000), density=(density, density)
-        )
-        yield TYPES[type], points
+        sample = draw_sample(rng, (30, 3000), (density, density))
+        yield TYPES[sample.type], sample.xyz
 
 
 def calibrate(count: int) -> None:

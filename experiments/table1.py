@@ -8,8 +8,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from benchmarks.samples import training_sample
+from benchmarks.samples import draw_sample
 
+from hiproof.learn.sample import Sample
 from hiproof.segment import NOT_ROOF, Segmentation, segment
 from hiproof.segment.scores import Scores
 from hiproof.simulate import ROOF_TYPES
@@ -36,14 +37,14 @@ def run(options: Options) -> Result:
     """
     count = 4 if options.quick else 1000
     rng = np.random.default_rng(options.seed + UNSEEN)
-    samples = [training_sample(rng, TYPES) for _ in range(count)]
-    answers = [segment(points) for points, _, _ in samples]
-    true_labels = np.concatenate([labels for _, labels, _ in samples])
+    samples = [draw_sample(rng) for _ in range(count)]
+    answers = [segment(sample.xyz) for sample in samples]
+    true_labels = np.concatenate([list_labels(sample) for sample in samples])
     labels = Scores.of(
         true_labels, np.concatenate([list_labels(answer) for answer in answers]), LABELS
     )
     types = Scores.of(
-        np.array([kind for _, _, kind in samples]),
+        np.array([sample.type for sample in samples]),
         np.array([get_type_index(a) for a in answers]),
         TYPES,
     )
@@ -75,7 +76,7 @@ def read_labelled_roofs(options: Options) -> Iterator[tuple[str, np.ndarray]]:
             yield kind, np.loadtxt(path)[:, :3]
 
 
-def list_labels(answer: Segmentation) -> np.ndarray:
+def list_labels(answer: Segmentation | Sample) -> np.ndarray:
     """Return labels (n,) as indices into LABELS."""
     return np.where(answer.labels == NOT_ROOF, len(TYPES), answer.labels)
 

@@ -194,7 +194,7 @@ def test_a_block_that_cannot_be_split_is_one_failure_and_changes_no_other(
 
 def test_a_square_in_which_no_roofs_can_be_found_is_one_failure(tmp_path, monkeypatch):
     """The roofs of a cloud without classes are found in squares of 250 m."""
-    scene = make_town(17, density=3.0)
+    scene = make_town(13, density=3.0)
     cloud = str(write_cloud(tmp_path / "cloud.laz", scene.xyz, np.ones(len(scene.xyz), np.uint8)))
     run([cloud], tmp_path / "undisturbed", with_footprints=False)
     expected = by_id(tmp_path / "undisturbed")

@@ -289,7 +289,7 @@ def test_a_run_says_that_a_clouds_heights_come_in_coarse_steps(tmp_path):
 @pytest.mark.parametrize("up", [0.0, 43.0])
 def test_files_side_by_side_whose_heights_never_meet_are_told(up, tmp_path):
     """As where one tile has heights over the ellipsoid: a house on the border is 43 m tall."""
-    town = make_town(houses=2)
+    town = make_town(houses=2, density=6.0)
     is_east = town.xyz[:, 0] > ORIGIN[0] + 44
     town.xyz[is_east, 2] += up
     clouds = tuple(

@@ -33,7 +33,7 @@ def gable(x, y, width, length, eave, rise):
     return eave + rise * (1 - np.abs(y - width / 2) / (width / 2))
 
 
-def make_town(houses: int = 4, density: float = 6.0, seed: int = 0) -> Town:
+def make_town(houses: int = 4, density: float = 4.0, seed: int = 0) -> Town:
     """Gables and flat blocks in a row along a street that rises a little; ground around them, a
     tree, some noise.
     """

@@ -29,7 +29,7 @@ TYPES = (
     "truncated_gable",
 )
 COMPOUNDS = ("L", "T", "U", "cross", "extension", "dormered", "row")
-SCENES = 15
+SCENES = 10
 PARAMETERS = (
     "width",
     "length",
@@ -62,8 +62,8 @@ def measure_scenes(kind):
 @pytest.mark.parametrize("kind", TYPES)
 def test_no_error_of_a_type_is_more_than_three_deviations_in_most_scenes(kind):
     scenes = [[abs(ratio) for _, ratio in scene] for scene in measure_scenes(kind)]
-    assert sum(len(scene) > 0 for scene in scenes) >= 8
-    assert sum(max(scene, default=0.0) <= 3.0 for scene in scenes) >= 13
+    assert sum(len(scene) > 0 for scene in scenes) >= 6
+    assert sum(max(scene, default=0.0) <= 3.0 for scene in scenes) >= 9
 
 
 @pytest.mark.parametrize("name", PARAMETERS)
@@ -72,7 +72,7 @@ def test_two_thirds_of_the_errors_of_a_parameter_are_within_one_deviation(name):
     for scene in (scene for kind in (*TYPES, *COMPOUNDS) for scene in measure_scenes(kind)):
         for one, ratio in scene:
             ratios[one].append(abs(ratio))
-    assert len(ratios[name]) >= 10
+    assert len(ratios[name]) >= 7
     assert 0.5 < np.quantile(ratios[name], 0.683) < 1.5
     # a blunder now and then: seven in a hundred, or three of few
     assert np.count_nonzero(np.array(ratios[name]) > 3.0) <= max(3, 0.07 * len(ratios[name]))

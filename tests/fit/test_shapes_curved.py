@@ -87,13 +87,13 @@ def test_a_pointed_roof_over_a_polygon_has_a_facet_over_each_wall():
 def test_a_cone_is_no_onion_of_any_width():
     """No bulge lies along a cone, so its points do not determine that of an onion."""
     right = 0
-    for seed in range(100, 112):
+    for seed in range(100, 107):
         scene, parts = fit_scene("cone", "tower", seed)
         true, _, _ = CATALOGUE["cone"].from_theta(scene.theta)
         curved = [part for part in parts if part.type != "flat"]
         if [part.type for part in curved] == ["cone"]:
             right += curved[0].parameters["width"] == pytest.approx(true["width"], rel=0.1)
-    assert right >= 9
+    assert right >= 5
 
 
 @pytest.mark.parametrize(("setting", "seed"), [("alone", 10), ("tower", 10)])
@@ -135,10 +135,10 @@ def test_an_onion_on_a_tower_is_as_high_as_it_is():
 
     Of 40 seeds, the type is right in 35, and the height within 0.2 m too in 29.
     """
-    outcomes = [judge_parts(*fit_scene("onion", "tower", seed)) for seed in range(12)]
-    assert sum(outcome.is_right for outcome in outcomes) >= 8
+    outcomes = [judge_parts(*fit_scene("onion", "tower", seed)) for seed in range(6)]
+    assert sum(outcome.is_right for outcome in outcomes) >= 4
     near = [outcome.is_right and abs(outcome.height_error_m) <= 0.2 for outcome in outcomes]
-    assert sum(near) >= 6
+    assert sum(near) >= 3
 
 
 def test_an_onion_is_found_around_what_looks_like_a_spire():

@@ -59,11 +59,11 @@ def measure_roof_edges(fit):
 )
 def test_creases_end_in_corners_where_points_lie_a_little_beside_the_outline(name, beside):
     (outline, height), right = make_house(name), 0
-    for seed in range(10):
+    for seed in range(6):
         points = sample_heights(height, outline, 5.0, 0.02, seed) + (*beside, 0.0)
         fit = fit_building(points, outline)
         right += len(fit.roof_parts) == 2 and measure_roof_edges(fit).min() > DRAWN_M
-    assert right >= 8
+    assert right >= 5
 
 
 @pytest.mark.parametrize("lower", [0.25, 0.5])

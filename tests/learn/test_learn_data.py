@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks.samples import training_sample
 
 from handmade import RD_ORIGIN, box, make_building
 from hiproof.errors import InputError
@@ -155,6 +154,7 @@ def test_unknown_types_and_unusable_files_are_refused(tmp_path):
 
 
 CLASSES = {"gable": "Saddleback roof", "hip": "Two-sided hip roof", "pyramid": "Pyramid roof"}
+PLACE = (583_000.0, 4_507_000.0, 20.0)
 OUTLINE = "MULTIPOLYGON(((0 0,9 0,9 9,0 9,0 0)))"
 
 
@@ -178,16 +178,15 @@ def write_roofn3d(folder, count=40, header_of_points="points"):
     surfaces = [
         ["id", "points", "outline", "plane_a", "plane_b", "plane_c", "plane_d", "fk_buildings"]
     ]
-    roof_points = {}
+    roof_points, source = {}, open_source("simulated", TRAINING_TYPES)
     for id in range(count):
-        points, labels, type = training_sample(
-            np.random.default_rng(id), TRAINING_TYPES, n_points=(80, 200)
-        )
-        points = points + (583_000.0, 4_507_000.0, 20.0)
+        sample = source.sample(TRAINING, id)
+        few = slice(None, None, 1 + len(sample.xyz) // 200)
+        points, on_roof = sample.xyz[few] + PLACE, sample.labels[few] != NOT_ROOF
         buildings.append(
             [
                 id,
-                CLASSES[TRAINING_TYPES[type]],
+                CLASSES[TRAINING_TYPES[sample.type]],
                 multipoint(points),
                 OUTLINE,
                 "",
@@ -195,8 +194,8 @@ def write_roofn3d(folder, count=40, header_of_points="points"):
                 "MULTIPOLYGON Z (((0 0 0,1 0 0,1 1 0,0 0 0)))",
             ]
         )
-        surfaces.append([1000 + id, multipoint(points[labels < 3]), OUTLINE, 0, 0, 1, -20, id])
-        roof_points[str(id)] = int((labels < 3).sum())
+        surfaces.append([1000 + id, multipoint(points[on_roof]), OUTLINE, 0, 0, 1, -20, id])
+        roof_points[str(id)] = int(on_roof.sum())
     buildings.append(buildings[1])
     for name, rows in ((BUILDINGS_FILE, buildings), (SURFACES_FILE, surfaces)):
         with open(folder / name, "w", encoding="utf-8", newline="") as file:

@@ -6,16 +6,22 @@ import pytest
 torch = pytest.importorskip("torch", reason="needs the extra `train` (torch)")
 onnx = pytest.importorskip("onnx", reason="needs the extra `train` (onnx)")
 
-from benchmarks.samples import training_sample  # noqa: E402
-
 from hiproof.errors import InputError  # noqa: E402
+from hiproof.learn.data import open_source  # noqa: E402
 from hiproof.learn.export import export, read_weights  # noqa: E402
 from hiproof.learn.network import (  # noqa: E402
     NetworkSettings,
     RoofNetwork,
     network_inputs,
 )
-from hiproof.learn.sample import ACROSS_AXES, ALONG_AXES, AugmentSettings, symmetric, vary_cloud  # noqa: E402
+from hiproof.learn.sample import (  # noqa: E402
+    ACROSS_AXES,
+    ALONG_AXES,
+    TRAINING,
+    AugmentSettings,
+    symmetric,
+    vary_cloud,
+)
 from hiproof.segment.arrange import Layout, arrange  # noqa: E402
 from hiproof.segment.inference import SHIPPED_WEIGHTS, load, run  # noqa: E402
 
@@ -39,9 +45,8 @@ def tiny_network(seed=0):
 
 
 def clouds(count, layout=TINY.layout, start=0):
-    return [
-        arrange(training_sample(np.random.default_rng(start + i))[0], layout) for i in range(count)
-    ]
+    source = open_source("simulated")
+    return [arrange(source.sample(TRAINING, start + i).xyz, layout) for i in range(count)]
 
 
 def largest_difference(network, path, arrangements):
@@ -78,7 +83,7 @@ def test_weights_of_another_network_or_none_are_refused(tmp_path):
 def test_repeated_points_of_a_small_cloud_change_nothing_for_the_others():
     """A cloud smaller than the layout is filled with repeats, whose logits are the originals'."""
     network = tiny_network()
-    xyz = training_sample(np.random.default_rng(5))[0][:40]
+    xyz = open_source("simulated").sample(TRAINING, 5).xyz[:40]
     arranged = arrange(xyz, TINY.layout)
     with torch.no_grad():
         logits, _ = network(*network_inputs([arranged], TINY.layout))
@@ -116,7 +121,8 @@ def test_symmetric_mirrors_along_and_across_and_nothing_else():
 
 
 def test_varied_keeps_labels_with_their_points():
-    xyz, labels, _ = training_sample(np.random.default_rng(6))
+    sample = open_source("simulated").sample(TRAINING, 6)
+    xyz, labels = sample.xyz, sample.labels
     settings = AugmentSettings(scale=0.0, stretch=0.0, jitter_m=0.0)
     changed, new_labels = vary_cloud(xyz, labels, np.random.default_rng(1), settings)
     label_of = {tuple(point): label for point, label in zip(xyz, labels, strict=True)}

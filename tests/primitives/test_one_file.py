@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 import test_laws as laws
-from benchmarks.samples import training_sample
 
 import hiproof
 from hiproof.compose import check_solid
 from hiproof.draw.primitives import primitive_svg
 from hiproof.errors import InputError
+from hiproof.learn.data import as_sample
 from hiproof.parametric.schema import schema
 from hiproof.primitives import CATALOGUE
-from hiproof.segment import combine
+from hiproof.segment import NOT_ROOF, combine
 from hiproof.simulate import ScanSettings, random_building, scan
 from hiproof.write.building_attributes import osm_shape
 from hiproof.write.citygml.version2 import roof_type_code
@@ -67,8 +67,9 @@ def test_it_is_simulated(house_and_points, curb):
     building, points = house_and_points
     assert building.type == NAME and set(building.parameters) == set(curb.parameters)
     assert len(points) > 4 * building.outline.area
-    _, labels, _ = training_sample(np.random.default_rng(0), ("flat", NAME), density=(5.0, 6.0))
-    assert set(np.unique(labels)) <= {0, 1, 2}
+    rng = np.random.default_rng(0)
+    sample = as_sample(scan(building, rng, ScanSettings(density=5.0)), ("flat", NAME), 1, rng)
+    assert set(np.unique(sample.labels)) == {NOT_ROOF, 1}
 
 
 @pytest.mark.parametrize("parts", ["one", "compound"])

@@ -5,7 +5,6 @@ import dataclasses
 import numpy as np
 import pytest
 import shapely
-from benchmarks.samples import training_sample
 
 from handmade import box
 from hiproof.errors import InputError
@@ -181,19 +180,6 @@ def test_uniform_points_have_the_papers_noise():
     assert len(points) / 40 / building.outline.area == pytest.approx(4.72, rel=0.05)
 
 
-def test_training_samples_keep_their_promises():
-    rng = np.random.default_rng(19)
-    types = ("pyramid", "gable", "hip")
-    visited = set()
-    for _ in range(40):
-        points, labels, type = training_sample(rng, types, n_points=(100, 400), density=(2.0, 8.0))
-        assert 100 <= len(points) <= 400 and len(labels) == len(points)
-        assert set(labels) <= {type, 3} and type in labels
-        assert np.abs(points.mean(axis=0)).max() < 1e-9
-        visited.add(type)
-    assert visited == {0, 1, 2}
-
-
 def test_pieces_that_beams_cannot_enter_are_refused():
     corner = shapely.Polygon([(0, 0), (4, 0), (4, 4), (2, 1), (0, 4)])
     yard = shapely.Point(0, 0).buffer(9).difference(shapely.Point(0, 0).buffer(3))
@@ -238,9 +224,5 @@ def test_bad_requests_are_refused_in_a_sentence():
         scan(building, rng, ScanSettings(max_scan_angle_deg=80.0))
     with pytest.raises(InputError, match="at least one solid"):
         scan_solids([], rng)
-    with pytest.raises(InputError, match="expected roof types"):
-        training_sample(rng, ("gable", "igloo"))
-    with pytest.raises(InputError, match="expected point counts"):
-        training_sample(rng, n_points=(100_000, 200_000), density=(1.0, 1.0))
     with pytest.raises(InputError, match="expected a roof type"):
         random_building(rng, "igloo")

@@ -20,7 +20,7 @@ HOUSES = 9
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
     """The folder of a run over a town of nine houses, beside its cloud."""
-    folder, town = tmp_path_factory.mktemp("run"), make_town(HOUSES)
+    folder, town = tmp_path_factory.mktemp("run"), make_town(HOUSES, 3.0)
     cloud = write_cloud(folder / "first.laz", town.xyz, town.classification)
     outlines = write_footprints(folder / "outlines.geojson", town.footprints)
     reconstruct_area(Request((str(cloud),), folder / "models", str(outlines), id_attribute="id"))
@@ -38,7 +38,7 @@ def update(run, out, cloud, changes=None, **options):
 
 
 def write_later(folder, aside=(0.0, 0.0, 0.0)):
-    town = make_town(HOUSES, seed=5)
+    town = make_town(HOUSES, 3.0, seed=5)
     return write_cloud(folder / "later.laz", town.xyz + np.array(aside), town.classification)
 
 
@@ -102,7 +102,7 @@ def test_new_outlines_beside_their_roofs_are_moved_where_earlier_ones_show_it(ru
 
 def test_houses_built_anew_beside_where_they_stood_are_no_shift(run, tmp_path):
     """Their new outlines lie on their new roofs."""
-    town = make_town(HOUSES, seed=5)
+    town = make_town(HOUSES, 3.0, seed=5)
     town.xyz[town.classification == 6, 0] += 1.3
     cloud = write_cloud(tmp_path / "later.laz", town.xyz, town.classification)
     outlines = {id: shapely.affinity.translate(o, 1.3) for id, o in town.footprints.items()}
