@@ -65,7 +65,7 @@ def test_all_formats_give_the_same_sky(name, writer, zone, tmp_path):
 def test_files_without_weather_get_a_sentence(name, text, tmp_path):
     (tmp_path / name).write_text(text)
     with pytest.raises(InputError, match="expected weather of a typical year as EPW, TMY3 or PV"):
-        make_sky(*DELFT, 0.0, 0.0, str(tmp_path / name))
+        read_year(str(tmp_path / name))
 
 
 def test_a_year_with_a_gap_gets_a_sentence(tmp_path):
@@ -73,7 +73,7 @@ def test_a_year_with_a_gap_gets_a_sentence(tmp_path):
     lines = (tmp_path / "a.csv").read_text().splitlines()
     (tmp_path / "a.csv").write_text("\n".join(lines[:-24]) + "\n")
     with pytest.raises(InputError, match=r"expected the 8760 hours of a year in .*, got 8736"):
-        make_sky(*DELFT, 0.0, 0.0, str(tmp_path / "a.csv"))
+        read_year(str(tmp_path / "a.csv"))
 
 
 def spoil(hours=slice(None), **factors):
@@ -126,7 +126,7 @@ def level_beam(columns):
 def test_radiation_that_its_sun_cannot_make_is_refused(change, reason, tmp_path):
     write_epw(tmp_path / "a.epw", change=change)
     with pytest.raises(InputError, match=reason):
-        make_sky(*DELFT, 0.0, 0.0, str(tmp_path / "a.epw"))
+        read_year(str(tmp_path / "a.epw"))
 
 
 def test_an_epw_of_a_leap_year_is_that_of_its_other_days(tmp_path):
@@ -143,7 +143,7 @@ def test_an_epw_of_a_leap_year_is_that_of_its_other_days(tmp_path):
 def test_a_year_without_direct_radiation_comes_with_a_warning(tmp_path):
     write_epw(tmp_path / "a.epw", change=make_overcast)
     with pytest.warns(InputWarning, match="a.epw: has hardly any direct radiation in . months"):
-        make_sky(*DELFT, 0.0, 0.0, str(tmp_path / "a.epw"))
+        read_year(str(tmp_path / "a.epw"))
 
 
 def test_a_summer_without_direct_radiation_comes_with_a_warning(tmp_path):
@@ -155,7 +155,7 @@ def test_a_summer_without_direct_radiation_comes_with_a_warning(tmp_path):
 
     write_epw(tmp_path / "a.epw", change=change)
     with pytest.warns(InputWarning, match="a.epw: has hardly any direct radiation in 2 months"):
-        make_sky(*DELFT, 0.0, 0.0, str(tmp_path / "a.epw"))
+        read_year(str(tmp_path / "a.epw"))
 
 
 @pytest.mark.parametrize("factor, share", [(2.0, "[23]"), (3.6, "[23]"), (0.77, "9")])
@@ -164,7 +164,7 @@ def test_a_year_without_clear_hours_comes_with_a_warning(factor, share, tmp_path
     other = dict.fromkeys(("ghi", "dhi", "dni"), lambda v: v / factor)
     write_epw(tmp_path / "a.epw", change=spoil(**other))
     with pytest.warns(InputWarning, match=f"has {share}[0-9]% .* in its brightest hours"):
-        make_sky(*DELFT, 0.0, 0.0, str(tmp_path / "a.epw"))
+        read_year(str(tmp_path / "a.epw"))
 
 
 def copy_days(source, first, count):
@@ -183,7 +183,7 @@ def test_days_that_repeat_another_come_with_a_warning(source, first, count, tmp_
     write_epw(tmp_path / "a.epw", change=copy_days(source, first, count))
     days = "1 day" if count == 1 else f"{count} days"
     with pytest.warns(InputWarning, match=f"a.epw: repeats the radiation of .* on {days}, first"):
-        make_sky(*DELFT, 0.0, 0.0, str(tmp_path / "a.epw"))
+        read_year(str(tmp_path / "a.epw"))
 
 
 def test_hours_that_stay_the_same_come_with_a_warning(tmp_path):
@@ -193,7 +193,7 @@ def test_hours_that_stay_the_same_come_with_a_warning(tmp_path):
 
     write_epw(tmp_path / "a.epw", change=change)
     with pytest.warns(InputWarning, match="for four hours or more, first on 30 June, 12:30"):
-        make_sky(*DELFT, 0.0, 0.0, str(tmp_path / "a.epw"))
+        read_year(str(tmp_path / "a.epw"))
 
 
 @pytest.mark.parametrize(

@@ -1,15 +1,12 @@
 """Quality figures on solids whose figures are known by hand."""
 
-import json
 import math
-import subprocess
-import sys
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pytest
 import shapely
+from benchmarks.judging import SHARED, load_tool
 
 from handmade import box
 from hiproof.city.folder.ledger import Ledger
@@ -26,7 +23,6 @@ from hiproof.evaluate.metrics import (
 )
 from hiproof.evaluate.run import evaluate_run
 
-SHARED = Path(__file__).parents[2] / "../shared"
 AMSTERDAM = SHARED / "data/amsterdam_west"
 
 
@@ -83,18 +79,8 @@ def test_the_share_is_that_of_the_judge(tmp_path):
     """
     clouds, footprints = [str(min(AMSTERDAM.glob("*.laz")))], str(AMSTERDAM / "footprints_bag.gpkg")
     reconstruct_area(Request(tuple(clouds), tmp_path, footprints))
-    tool = [
-        sys.executable,
-        SHARED / "tools/roof_residuals.py",
-        tmp_path / "buildings.city.jsonl",
-        footprints,
-        *clouds,
-    ]
-    judged = json.loads(
-        subprocess.run(
-            [*map(str, tool), "--json"], capture_output=True, text=True, check=True
-        ).stdout
-    )
+    models = tmp_path / "buildings.city.jsonl"
+    judged = load_tool("roof_residuals").measure(models, footprints, clouds)
     ledger = Ledger(tmp_path / ".hiproof" / "ledger.sqlite", read_only=True)
     rows = ledger.run("select share from building where share is not null order by position")
     kept = [share for (share,) in rows]

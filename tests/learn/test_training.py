@@ -9,7 +9,7 @@ torch = pytest.importorskip("torch", reason="needs the extra `train` (torch)")
 pytest.importorskip("onnx", reason="needs the extra `train` (onnx)")
 pytest.importorskip("matplotlib", reason="needs the extra `train` (matplotlib)")
 
-from benchmarks.samples import training_sample  # noqa: E402
+from benchmarks.samples import draw_sample  # noqa: E402
 
 from hiproof.errors import InputError, OutputError, SettingsError  # noqa: E402
 from hiproof.learn import TrainSettings, train  # noqa: E402
@@ -55,7 +55,7 @@ def test_a_killed_run_goes_on_to_the_same_weights(tmp_path):
     assert (tmp_path / "whole" / "curve.png").stat().st_size > 1000
     assert "balanced accuracy" in (tmp_path / "whole" / "model_card.md").read_text()
 
-    points = training_sample(np.random.default_rng(0), ("gable",))[0]
+    points = draw_sample(np.random.default_rng(0), types=("gable",)).xyz
     settings = Settings().replace({"segment": {"weights": str(path)}})
     assert set(segment(points, settings).types) == {"flat", "gable"}
 
@@ -63,7 +63,7 @@ def test_a_killed_run_goes_on_to_the_same_weights(tmp_path):
 def test_curved_types_are_classes_where_they_are_named(tmp_path):
     settings = TrainSettings(**{**vars(TINY), "types": ("flat", "dome"), "samples": 24})
     path = train("simulated", tmp_path, settings)
-    points = training_sample(np.random.default_rng(0), ("dome",))[0]
+    points = draw_sample(np.random.default_rng(0), types=("dome",)).xyz
     result = segment(points, Settings().replace({"segment": {"weights": str(path)}}))
     assert set(result.types) == {"flat", "dome"}
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from benchmarks.samples import training_sample
+from benchmarks.samples import draw_sample
 
 from hiproof.segment.arrange import Layout, arrange
 from hiproof.segment.sampling import (
@@ -18,7 +18,7 @@ LAYOUT = Layout(points=COUNT, levels=LEVELS, neighbours=GROUP)
 
 
 def some_cloud(seed=0, count=200):
-    return centre(training_sample(np.random.default_rng(seed))[0][:count])
+    return centre(draw_sample(np.random.default_rng(seed)).xyz[:count])
 
 
 def centre(xyz):

@@ -8,7 +8,7 @@ from pathlib import Path
 import laspy
 import numpy as np
 import pytest
-from benchmarks.samples import training_sample
+from benchmarks.samples import draw_sample
 from click.testing import CliRunner
 
 from hiproof.cli.app import import_command
@@ -44,10 +44,9 @@ def turn(xyz, angle):
 
 def cloud(seed, types=ROOF_TYPES):
     """Points (n, 3), labels (n,) with -1 for not-roof, and the type's name."""
-    points, labels, type = training_sample(
-        np.random.default_rng([77, seed]), types, density=(4.0, 8.0)
-    )
-    return points, np.where(labels == len(types), NOT_ROOF, labels), types[type]
+    rng = np.random.default_rng([77, seed])
+    sample = draw_sample(rng, density=(4.0, 8.0), types=types)
+    return sample.xyz, sample.labels, types[sample.type]
 
 
 def test_types_are_those_of_whole_roofs_in_the_catalogues_order():
@@ -320,7 +319,7 @@ def test_expected_distance_is_the_mean_over_noise_and_outliers():
 
 
 def write_cloud(path, seed, shift=(85_000.0, 446_000.0, 10.0)):
-    points = np.round(training_sample(np.random.default_rng(seed))[0] + shift, 3)
+    points = np.round(draw_sample(np.random.default_rng(seed)).xyz + shift, 3)
     np.savetxt(path, points, fmt="%.3f")
     return points
 
