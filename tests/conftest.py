@@ -102,6 +102,14 @@ def reference_run(town_files, tmp_path_factory):
     return out
 
 
+@pytest.fixture(scope="session")
+def town_run(town_files, tmp_path_factory):
+    """The folder of a run over the tiny town; do not write into it."""
+    out = tmp_path_factory.mktemp("town_run")
+    reconstruct_area(Request((town_files[0],), out, town_files[1]))
+    return out
+
+
 @pytest.fixture
 def solved_ids(monkeypatch):
     """The ids of buildings that are solved, as they are."""

@@ -1,6 +1,5 @@
 """The same run on a real Dask cluster: worker processes on this machine, killed in mid-work."""
 
-import dataclasses
 import os
 import subprocess
 import sys
@@ -12,10 +11,10 @@ from hiproof.city import run as city_run
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.errors import InputError, OutputError
 from hiproof.update import run as update_run
-from hiproof.update.request import UpdateRequest
 from hiproof.update.run import update_area
 from run_records import by_id, records
-from tiny_town import make_town, write_cloud
+from tiny_town import make_town
+from tiny_updates import make_request
 
 dask = pytest.importorskip("dask", reason="needs dask[distributed], the extra `city`")
 distributed = pytest.importorskip("distributed", reason="needs dask[distributed], the extra `city`")
@@ -45,20 +44,15 @@ def small_tiles(monkeypatch):
 
 
 def test_an_update_on_a_cluster_whose_worker_is_killed_changes_no_byte(
-    town_files, cluster, tmp_path, monkeypatch
+    town_run, cluster, tmp_path, monkeypatch
 ):
-    run, later = tmp_path / "run", make_town(seed=7)
+    later = make_town(seed=7)
     later.xyz[later.classification == 6, 2] += 1.5
-    cloud = str(write_cloud(tmp_path / "later.laz", later.xyz, later.classification))
-    reconstruct_area(Request((town_files[0],), run, town_files[1]))
+    cloud = later.write(tmp_path / "later.laz")
     monkeypatch.setattr("hiproof.update.plan.limit_buildings_per_tile", lambda _: 1)
-    parameters = str(run / "parameters.jsonl")
     outs = tmp_path / "alone", tmp_path / "cluster"
     for out, address in zip(outs, (None, cluster.scheduler_address), strict=True):
-        request = UpdateRequest(
-            (cloud,), out, run=run, run_parameters=parameters, scheduler=address
-        )
-        update_area(dataclasses.replace(request, date="2024-05-01"))
+        update_area(make_request(town_run, cloud, out, scheduler=address))
         monkeypatch.setattr(update_run, "update_tile", planted.kill_once_and_update)
     assert (outs[1] / ".hiproof" / "killed").exists()
     assert records(outs[0]) == records(outs[1])

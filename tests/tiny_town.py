@@ -2,7 +2,7 @@
 enough for any test.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
@@ -24,6 +24,18 @@ class Town:
     xyz: np.ndarray
     classification: np.ndarray
     footprints: dict[str, shapely.Polygon]
+
+    def lie_in(self, area) -> np.ndarray:
+        """Whether each point (n,) lies in an area."""
+        return shapely.intersects_xy(area, *self.xyz[:, :2].T)
+
+    def select(self, chosen) -> "Town":
+        """The town with some of its points."""
+        return replace(self, xyz=self.xyz[chosen], classification=self.classification[chosen])
+
+    def write(self, path: Path, shift=0.0, **options) -> str:
+        """Write the cloud, moved by a shift; the path as text."""
+        return str(write_cloud(path, self.xyz + shift, self.classification, **options))
 
 
 def gable(x, y, width, length, eave, rise):
@@ -99,5 +111,5 @@ def write_town(folder: Path, town: Town | None = None) -> tuple[Path, Path]:
     """Paths of the town's cloud and footprints, written into `folder`."""
     town = town or make_town()
     folder.mkdir(parents=True, exist_ok=True)
-    cloud = write_cloud(folder / "cloud.laz", town.xyz, town.classification)
+    cloud = Path(town.write(folder / "cloud.laz"))
     return cloud, write_footprints(folder / "footprints.geojson", town.footprints)

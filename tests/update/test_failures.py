@@ -1,42 +1,30 @@
 """A building that fails in an update, or in a run of several surveys, stops no other."""
 
-import dataclasses
 import logging
 
 import pytest
 
 from hiproof.city.request import Request
-from hiproof.city.run import reconstruct_area
 from hiproof.city.work.repro import solve_bundle
 from hiproof.errors import DamagedRaster
 from hiproof.parametric.building import build
 from hiproof.update import best, several, solve
-from hiproof.update.request import WHOLE_CITY, UpdateRequest
+from hiproof.update.request import WHOLE_CITY
 from hiproof.update.run import update_area
 from run_records import by_id
-from tiny_town import make_town, write_cloud
+from tiny_town import make_town
+from tiny_updates import make_request
 
 FAILING = "house-1"
 
 
 @pytest.fixture(scope="module")
 def later(tmp_path_factory):
-    town = make_town(seed=7)
-    folder = tmp_path_factory.mktemp("later")
-    return str(write_cloud(folder / "later.laz", town.xyz, town.classification))
-
-
-@pytest.fixture(scope="module")
-def run(town_files, tmp_path_factory):
-    out = tmp_path_factory.mktemp("models")
-    reconstruct_area(Request((town_files[0],), out, town_files[1]))
-    return out
+    return make_town(seed=7).write(tmp_path_factory.mktemp("later") / "later.laz")
 
 
 def update(run, later, out, **options):
-    parameters = str(run / "parameters.jsonl")
-    request = UpdateRequest((later,), out, run=run, run_parameters=parameters, date="2024-05-01")
-    update_area(dataclasses.replace(request, **options))
+    update_area(make_request(run, later, out, **options))
 
 
 def take_surveys(town_files, later, out):
@@ -57,12 +45,17 @@ def raise_for(patch, owner, name, error):
 
 
 @pytest.mark.parametrize("over", ["buildings", WHOLE_CITY])
-def test_a_building_that_fails_in_an_update_stops_no_other(run, later, over, tmp_path, monkeypatch):
-    update(run, later, tmp_path / "whole", significance_over=over)
+def test_a_building_that_fails_in_an_update_stops_no_other(
+    town_run, later, over, tmp_path, monkeypatch
+):
+    update(town_run, later, tmp_path / "whole", significance_over=over)
     expected = by_id(tmp_path / "whole")
     raise_for(monkeypatch, solve.Updater, "judge", KeyError("no such wall"))
     check_failure(
-        expected, tmp_path, lambda out: update(run, later, out, significance_over=over), monkeypatch
+        expected,
+        tmp_path,
+        lambda out: update(town_run, later, out, significance_over=over),
+        monkeypatch,
     )
 
 
@@ -95,12 +88,12 @@ def check_failure(expected, folder, work, monkeypatch):
 
 
 def test_a_damaged_terrain_model_ends_both_with_its_sentence(
-    run, town_files, later, tmp_path, monkeypatch
+    town_run, town_files, later, tmp_path, monkeypatch
 ):
     damaged = DamagedRaster("expected a complete raster at dtm.tif, got: a hole; copy it again")
     raise_for(monkeypatch, solve.Updater, "judge", damaged)
     with pytest.raises(DamagedRaster, match="expected a complete raster"):
-        update(run, later, tmp_path / "updated")
+        update(town_run, later, tmp_path / "updated")
     raise_for(monkeypatch, best, "is_same", damaged)
     with pytest.raises(DamagedRaster, match="expected a complete raster"):
         take_surveys(town_files, later, tmp_path / "several")

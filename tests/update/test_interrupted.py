@@ -1,16 +1,16 @@
 """An update that is interrupted goes on, and gives the bytes of one that never was."""
 
+from functools import partial
+
 import pytest
 
-from hiproof.city.request import Request
-from hiproof.city.run import reconstruct_area
 from hiproof.update import before
 from hiproof.update import run as update_run
-from hiproof.update.request import UpdateRequest
 from hiproof.update.run import update_area
 from hiproof.update.solve import update_tile
 from run_records import RECORDS
-from tiny_town import make_town, write_cloud
+from tiny_town import make_town
+from tiny_updates import make_request
 
 FILES = (*RECORDS, "buildings.gpkg", "changes.csv", "changes.gpkg")
 
@@ -21,18 +21,11 @@ def small_tiles(monkeypatch):
 
 
 @pytest.fixture(scope="module")
-def make_update(town_files, tmp_path_factory):
-    folder, later = tmp_path_factory.mktemp("update"), make_town(seed=7)
+def make_update(town_run, tmp_path_factory):
+    later = make_town(seed=7)
     later.xyz[later.classification == 6, 2] += 1.5
-    cloud = str(write_cloud(folder / "later.laz", later.xyz, later.classification))
-    reconstruct_area(Request((town_files[0],), folder / "run", town_files[1]))
-    parameters = str(folder / "run" / "parameters.jsonl")
-
-    def make(out, **options):
-        run = {"run": folder / "run", "run_parameters": parameters, "date": "2024-05-01"}
-        return UpdateRequest((cloud,), out, **run, **options)
-
-    return make
+    cloud = later.write(tmp_path_factory.mktemp("update") / "later.laz")
+    return partial(make_request, town_run, cloud)
 
 
 @pytest.fixture(scope="module")
@@ -71,21 +64,16 @@ def test_an_update_stopped_between_tiles_goes_on(make_update, whole, tmp_path, m
     assert read_files(tmp_path) == whole
 
 
-@pytest.mark.parametrize("step", ["sort_earlier", "save_roofs_outside", "register_surveys"])
-def test_an_update_stopped_before_its_tiles_goes_on(
+STEPS = [(before, name) for name in ("sort_earlier", "save_roofs_outside", "register_surveys")]
+STEPS += [(update_run, "write_changes")]
+
+
+@pytest.mark.parametrize("step", STEPS, ids=lambda step: step[1])
+def test_an_update_stopped_before_or_after_its_tiles_goes_on(
     step, make_update, whole, tmp_path, monkeypatch
 ):
     with monkeypatch.context() as patch:
-        patch.setattr(before, step, stop)
-        with pytest.raises(KeyboardInterrupt):
-            update_area(make_update(tmp_path))
-    update_area(make_update(tmp_path))
-    assert read_files(tmp_path) == whole
-
-
-def test_an_update_stopped_at_its_tables_goes_on(make_update, whole, tmp_path, monkeypatch):
-    with monkeypatch.context() as patch:
-        patch.setattr(update_run, "write_changes", stop)
+        patch.setattr(*step, stop)
         with pytest.raises(KeyboardInterrupt):
             update_area(make_update(tmp_path))
     update_area(make_update(tmp_path))

@@ -52,7 +52,7 @@ def test_a_house_that_lost_one_half_and_got_a_storey_on_the_other(run, tmp_path)
     areas = {}
     for id, rise in (("house-0", 2.5), ("house-2", -1.5)):
         areas[id] = lay_bare(town, id, 0.5)
-        stands = shapely.intersects_xy(town.footprints[id], *town.xyz[:, :2].T)
+        stands = town.lie_in(town.footprints[id])
         town.xyz[stands & (town.classification == 6), 2] += rise
     after = update(run, tmp_path / "out", town)
     for id, kind in (("house-0", "part_raised"), ("house-2", "part_lowered")):
@@ -76,7 +76,7 @@ def test_a_steeper_roof_is_not_the_earlier_one_half_as_high(run, tmp_path):
 def test_an_uncertain_building_has_a_place(run, tmp_path):
     """Points of a building site lie at all heights."""
     town = make_town(seed=15, density=8.0)
-    inside = shapely.intersects_xy(town.footprints["house-0"], *town.xyz[:, :2].T)
+    inside = town.lie_in(town.footprints["house-0"])
     town.xyz[inside, 2] = ORIGIN[2] + np.random.default_rng(5).uniform(0, 7, inside.sum())
     change = update(run, tmp_path / "out", town)["house-0"]["change"]
     assert change["class"] == "uncertain"

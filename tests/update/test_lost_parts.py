@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 import shapely
 
-from hiproof.city.request import Request
-from hiproof.city.run import reconstruct_area
 from hiproof.errors import InputError
 from run_records import by_id
-from tiny_town import ORIGIN, make_town, write_cloud, write_footprints
-from tiny_updates import lay_bare, make_run, take_kind, update
+from tiny_town import ORIGIN, make_town, write_footprints
+from tiny_updates import lay_bare, make_run, raise_house, run_over, take_class, take_kind, update
 
 KEPT = {"house-0": 0.55, "house-2": 0.75, "house-3": 0.45}  # share of the length that stays
 
@@ -47,7 +45,7 @@ def test_a_small_rest_that_stands_is_not_demolished(run, density, tmp_path):
     lay_bare(town, "house-2", 0.0)
     x0, y0, x1, y1 = town.footprints["house-2"].bounds
     tower = shapely.box(x0, y0, x0 + 0.3 * (x1 - x0), y1)
-    is_tower = shapely.intersects_xy(tower, *town.xyz[:, :2].T)
+    is_tower = town.lie_in(tower)
     town.xyz[is_tower, 2] += 9.0
     town.classification[is_tower] = 6
     lay_bare(town, "house-3", 0.0)
@@ -67,10 +65,10 @@ def test_a_small_rest_that_stands_is_not_demolished(run, density, tmp_path):
 def test_a_house_built_anew_beside_its_place_was_moved(run, east, kind, tmp_path):
     town = make_town(seed=7, density=8.0)
     x0, y0, x1, y1 = town.footprints["house-0"].bounds
-    is_house = shapely.intersects_xy(shapely.box(x0, y0, x1, y1), *town.xyz[:, :2].T)
+    is_house = town.lie_in(shapely.box(x0, y0, x1, y1))
     heights, classes = town.xyz[is_house] + [east, 0, 0], town.classification[is_house]
     lay_bare(town, "house-0", 0.0)
-    is_under = shapely.intersects_xy(shapely.box(x0 + east, y0, x1 + east, y1), *town.xyz[:, :2].T)
+    is_under = town.lie_in(shapely.box(x0 + east, y0, x1 + east, y1))
     town = dataclasses.replace(
         town,
         xyz=np.concatenate([town.xyz[~is_under], heights]),
@@ -91,7 +89,7 @@ def stand_on_slope(town, slope):
     """Raise the ground of a town to a slope to the east and to the north, and houses with it."""
     places = town.xyz[:, :2].copy()
     for outline in town.footprints.values():
-        places[shapely.intersects_xy(outline, *town.xyz[:, :2].T)] = outline.centroid.coords[0]
+        places[town.lie_in(outline)] = outline.centroid.coords[0]
     is_roof = town.classification == 6
     places[~is_roof] = town.xyz[~is_roof, :2]
     town.xyz[:, 2] += (places - ORIGIN[:2]) @ slope
@@ -104,9 +102,7 @@ def test_lines_of_a_scan_far_apart_show_what_lies_between_them(run, gap, tmp_pat
     town = make_town(seed=7, density=60.0)
     areas = {id: lay_bare(town, id, kept) for id, kept in KEPT.items()}
     on_line = (town.xyz[:, 1] - ORIGIN[1]) % gap < 0.06
-    town = dataclasses.replace(
-        town, xyz=town.xyz[on_line], classification=town.classification[on_line]
-    )
+    town = town.select(on_line)
     after = update(run, tmp_path / "out", town)
     assert take_kind(after["house-1"]) == "unchanged"
     for id, area in areas.items():
@@ -119,14 +115,12 @@ def test_lines_of_a_scan_far_apart_show_what_lies_between_them(run, gap, tmp_pat
 def test_what_lies_bare_on_a_slope_is_lost(slope, tmp_path):
     """The ground under a house is higher than its lowest place by more than a metre."""
     town = stand_on_slope(make_town(density=8.0), np.array(slope))
-    cloud = write_cloud(tmp_path / "first.laz", town.xyz, town.classification)
-    outlines = write_footprints(tmp_path / "outlines.geojson", town.footprints)
-    reconstruct_area(Request((str(cloud),), tmp_path / "run", str(outlines), id_attribute="id"))
+    run = run_over(tmp_path, town)
     town = make_town(seed=7, density=8.0)
     for id, kept in (KEPT | {"house-3": 0.0}).items():
         lay_bare(town, id, kept)
     town = stand_on_slope(town, np.array(slope))
-    after = update(tmp_path / "run", tmp_path / "out", town)
+    after = update(run, tmp_path / "out", town)
     kinds = {id: take_kind(row) for id, row in after.items()}
     expected = {"house-1": "unchanged"} | dict.fromkeys(KEPT, "part_removed")
     assert kinds == expected | {"house-3": "demolished"}
@@ -157,7 +151,7 @@ def lay_corner_bare(town, id, size):
     """Pull down a triangle at a corner of a house; return it."""
     x0, y0, _, _ = town.footprints[id].bounds
     corner = shapely.Polygon([(x0, y0), (x0 + size[0], y0), (x0, y0 + size[1])])
-    gone = shapely.intersects_xy(corner, *town.xyz[:, :2].T)
+    gone = town.lie_in(corner)
     town.xyz[gone, 2] = ORIGIN[2] + 0.01 * (town.xyz[gone, 0] - ORIGIN[0])
     town.classification[gone] = 2
     return corner
@@ -194,15 +188,11 @@ def test_full_trust_in_footprints_keeps_the_model_and_says_so(run, tmp_path):
 def test_a_sparse_survey_covers_what_it_covers(run, density, tmp_path):
     town = make_town(seed=8, density=density)
     lay_bare(town, "house-2", 0.0)
-    up = shapely.intersects_xy(town.footprints["house-1"], *town.xyz[:, :2].T)
-    town.xyz[up & (town.classification == 6), 2] += 2.0
+    raise_house(town, "house-1", 2.0)
     west = town.xyz[:, 0] < ORIGIN[0] + 90.0
-    town = dataclasses.replace(town, xyz=town.xyz[west], classification=town.classification[west])
+    town = town.select(west)
     after = update(run, tmp_path / "out", town)
-    classes = {
-        id: (row.get("change") or {"class": "unchanged"})["class"] for id, row in after.items()
-    }
-    assert classes == {
+    assert {id: take_class(row) for id, row in after.items()} == {
         "house-0": "unchanged",
         "house-1": "changed",
         "house-2": "gone",
@@ -240,8 +230,7 @@ def test_a_roof_that_moved_a_little_moved_as_a_whole(run, rise, tmp_path):
 def test_most_houses_may_grow_while_the_survey_is_shifted(run, tmp_path):
     town = make_town(seed=7)
     for id in ("house-0", "house-1", "house-3"):
-        up = shapely.intersects_xy(town.footprints[id], *town.xyz[:, :2].T)
-        town.xyz[up & (town.classification == 6), 2] += 2.8
+        raise_house(town, id, 2.8)
     town.xyz[:, 2] += 0.3
     with pytest.warns(UserWarning, match="3 of 4 sampled roofs lie elsewhere than the ground"):
         after = update(run, tmp_path / "out", town)
@@ -259,8 +248,8 @@ def test_a_half_that_is_gone_is_no_unchanged_part_of_a_split(run, is_seen, tmp_p
     x, outlines = x0 + 0.5 * (x1 - x0), {**town.footprints}
     lay_bare(town, "house-0", 0.5)
     if not is_seen:
-        far = ~shapely.intersects_xy(shapely.box(x, y0, x1, y1), *town.xyz[:, :2].T)
-        town = dataclasses.replace(town, xyz=town.xyz[far], classification=town.classification[far])
+        far = ~town.lie_in(shapely.box(x, y0, x1, y1))
+        town = town.select(far)
     del outlines["house-0"]
     outlines |= {"west": shapely.box(x0, y0, x, y1), "east": shapely.box(x, y0, x1, y1)}
     path = str(write_footprints(tmp_path / "split.gpkg", outlines))

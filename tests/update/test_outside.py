@@ -10,8 +10,6 @@ import pytest
 import shapely
 from jsonschema import Draft202012Validator
 
-from hiproof.city.request import Request
-from hiproof.city.run import reconstruct_area
 from hiproof.errors import InputError
 from hiproof.frames import turn_points
 from hiproof.model import PointCloud
@@ -20,23 +18,39 @@ from hiproof.parametric.schema import schema
 from hiproof.settings import ReadSettings
 from hiproof.update.change_tables import write_changes
 from hiproof.update.outside import SurveyCells, load_survey
-from hiproof.update.request import UpdateRequest
 from hiproof.update.run import update_area
-from tiny_town import ORIGIN, make_town, write_cloud, write_footprints
+from tiny_town import ORIGIN, make_town
+from tiny_updates import DATE, make_request, run_over
 
-DATE = "2024-05-01"
 BUILT, STOOD, GONE = (5, 28, 15, 36), (40, 28, 48, 36), (70, 28, 78, 36)
 EXTENSION = (20, 12, 24, 20)  # beside the first house
 SMALL, TREE = (100, 28, 102, 30), (105, 28, 115, 38)
 
 
+def place(corners):
+    """A box of the town in the world."""
+    return shapely.affinity.translate(shapely.box(*corners), *ORIGIN[:2])
+
+
 def put_block(town, corners, height=4.0, scatter=0.0):
     """Raise the ground of the town to the roof of a block."""
-    x, y = (town.xyz[:, :2] - ORIGIN[:2]).T
-    inside = shapely.intersects_xy(shapely.box(*corners), x, y) & (town.classification == 2)
+    inside = town.lie_in(place(corners)) & (town.classification == 2)
     noise = np.random.default_rng(3).uniform(-scatter, scatter, inside.sum())
     town.xyz[inside, 2] += height + noise
     town.classification[inside] = 6
+
+
+def compare(folder, before, after, shifts=(0.0, 0.0), changes=None):
+    """Run over a town, and return the summary of its update by the points of another."""
+    run = run_over(folder, before, shifts[0])
+    cloud = after.write(folder / "second.laz", shifts[1])
+    return update_area(make_request(run, cloud, folder / "out"), changes)
+
+
+def read_outside(folder):
+    """The rows of roofs outside in the table of changes."""
+    with (folder / "out" / "changes.csv").open() as file:
+        return [row for row in csv.DictReader(file) if row["class"] == "outside"]
 
 
 @pytest.fixture(scope="module")
@@ -47,43 +61,17 @@ def update(tmp_path_factory):
     for block in (STOOD, BUILT, EXTENSION, SMALL):
         put_block(after, block)
     put_block(after, TREE, 6.0, scatter=2.0)
-    first, second = (
-        str(write_cloud(folder / f"{name}.laz", town.xyz, town.classification))
-        for name, town in (("first", before), ("second", after))
-    )
-    footprints = str(write_footprints(folder / "footprints.geojson", before.footprints))
-    reconstruct_area(Request((first,), folder / "run", footprints))
-    parameters = str(folder / "run" / "parameters.jsonl")
-    request = UpdateRequest(
-        (second,), folder / "out", run=folder / "run", run_parameters=parameters, date=DATE
-    )
-    return update_area(request), folder / "out"
+    return compare(folder, before, after), folder / "out"
 
 
 @pytest.mark.parametrize("far_m", [5e5, 2e6])
 def test_points_far_away_cost_no_time(far_m, tmp_path):
     """As those of a file in another CRS: thousands of kilometres of squares lie between."""
     town = make_town()
-    first, second, third = (
-        str(write_cloud(tmp_path / f"{name}.laz", xyz, town.classification))
-        for name, xyz in (
-            ("a", town.xyz),
-            ("b", town.xyz + 0.01),
-            ("c", town.xyz + [far_m, far_m, 0]),
-        )
-    )
-    footprints = str(write_footprints(tmp_path / "footprints.geojson", town.footprints))
-    reconstruct_area(Request((first,), tmp_path / "run", footprints))
-    parameters = str(tmp_path / "run" / "parameters.jsonl")
-    request = UpdateRequest(
-        (second, third),
-        tmp_path / "out",
-        run=tmp_path / "run",
-        run_parameters=parameters,
-        date=DATE,
-    )
+    run = run_over(tmp_path, town)
+    clouds = town.write(tmp_path / "b.laz", 0.01), town.write(tmp_path / "c.laz", [far_m, far_m, 0])
     start = time.process_time()
-    summary = update_area(request)
+    summary = update_area(make_request(run, "", tmp_path / "out", clouds=clouds))
     assert time.process_time() - start < 60.0
     assert summary.by_change == {"unchanged": len(town.footprints)}
 
@@ -91,8 +79,7 @@ def test_points_far_away_cost_no_time(far_m, tmp_path):
 def test_roofs_outside_all_outlines_are_told_apart(update):
     summary, out = update
     assert summary.outside == {"built": 1, "demolished": 1, "extended": 1, "unmapped": 1}
-    with (out / "changes.csv").open() as file:
-        table = [row for row in csv.DictReader(file) if row["class"] == "outside"]
+    table = read_outside(out.parent)
     rows, areas = {row["kind"]: row for row in table}, [float(row["area_m2"]) for row in table]
     assert areas == sorted(areas, reverse=True) and len(set(areas)) > 1
     assert rows["extended"]["id"] == "house-0" and rows["built"]["id"] == ""
@@ -103,10 +90,10 @@ def test_roofs_outside_all_outlines_are_told_apart(update):
     kinds = columns[list(meta["fields"]).index("kind")].tolist()
     places = dict(zip(kinds, shapely.from_wkb(geometry), strict=True))
     for kind, corners in (("built", BUILT), ("demolished", GONE), ("unmapped", STOOD)):
-        box = shapely.box(*(np.array(corners) + [*ORIGIN[:2], *ORIGIN[:2]]))
+        box = place(corners)
         common = places[kind].intersection(box).area / places[kind].union(box).area
         assert common > 0.75, kind
-    box = shapely.box(*(np.array(EXTENSION) + [*ORIGIN[:2], *ORIGIN[:2]]))
+    box = place(EXTENSION)
     assert places["extended"].intersection(box).area > 0.75 * box.area
 
 
@@ -114,20 +101,10 @@ def test_roofs_outside_all_outlines_are_told_apart(update):
 def test_a_survey_without_ground_says_that_no_roofs_outside_are_found(classes, name, tmp_path):
     before, after = make_town(houses=2), make_town(houses=2, seed=7)
     put_block(after, BUILT)
-    for file, town, code in zip(("first", "second"), (before, after), classes, strict=True):
+    for town, code in zip((before, after), classes, strict=True):
         town.classification[:] = np.where(code == 1, 1, town.classification)
-        write_cloud(tmp_path / f"{file}.laz", town.xyz, town.classification)
-    footprints = str(write_footprints(tmp_path / "footprints.geojson", before.footprints))
-    reconstruct_area(Request((str(tmp_path / "first.laz"),), tmp_path / "run", footprints))
-    request = UpdateRequest(
-        (str(tmp_path / "second.laz"),),
-        tmp_path / "out",
-        run=tmp_path / "run",
-        run_parameters=str(tmp_path / "run" / "parameters.jsonl"),
-        date=DATE,
-    )
     with pytest.warns(UserWarning, match=f"the {name} survey has no points of a ground class"):
-        assert update_area(request).outside == {}
+        assert compare(tmp_path, before, after).outside == {}
 
 
 @pytest.mark.parametrize("turn", [0.0, 0.3, 0.7])
@@ -141,27 +118,17 @@ def test_an_extension_that_fills_a_gap_between_others_is_found(gap, turn, tmp_pa
         for side in sides.values():
             put_block(town, side, 3.0)
     put_block(after, gap, 3.0)
-    for name, town in (("first", before), ("second", after)):
-        town.xyz[:, :2] = ORIGIN[:2] + turn_points(town.xyz[:, :2] - ORIGIN[:2], turn)
-        write_cloud(tmp_path / f"{name}.laz", town.xyz, town.classification)
-    outlines = before.footprints | {
-        id: shapely.transform(shapely.box(*side), lambda xy: xy + ORIGIN[:2])
-        for id, side in sides.items()
-    }
+    outlines = before.footprints | {id: place(side) for id, side in sides.items()}
+
+    def turn_places(xy):
+        return ORIGIN[:2] + turn_points(xy - ORIGIN[:2], turn)
+
+    for town in (before, after):
+        town.xyz[:, :2] = turn_places(town.xyz[:, :2])
     for id, outline in outlines.items():
-        outlines[id] = shapely.transform(
-            outline, lambda xy: ORIGIN[:2] + turn_points(xy - ORIGIN[:2], turn)
-        )
-    footprints = str(write_footprints(tmp_path / "footprints.gpkg", outlines))
-    clouds = [str(tmp_path / f"{name}.laz") for name in ("first", "second")]
-    reconstruct_area(Request((clouds[0],), tmp_path / "run", footprints, id_attribute="id"))
-    parameters = str(tmp_path / "run" / "parameters.jsonl")
-    request = UpdateRequest(
-        (clouds[1],), tmp_path / "out", run=tmp_path / "run", run_parameters=parameters, date=DATE
-    )
-    assert update_area(request).outside == {"extended": 1}
-    with (tmp_path / "out" / "changes.csv").open() as file:
-        (row,) = (row for row in csv.DictReader(file) if row["class"] == "outside")
+        before.footprints[id] = shapely.transform(outline, turn_places)
+    assert compare(tmp_path, before, after).outside == {"extended": 1}
+    (row,) = read_outside(tmp_path)
     assert row["id"] == "house-0"
 
 
@@ -169,19 +136,12 @@ def test_a_shift_is_taken_off_roofs_outside(tmp_path):
     """Else an extension stands apart from its house, and all roofs reach beyond their outlines."""
     before, after = make_town(density=8.0), make_town(seed=7, density=8.0)
     put_block(after, (20, 12, 24, 20))
-    for name, town, shift in (("first", before, 0.0), ("second", after, [0.8, 0.3, 0.5])):
-        write_cloud(tmp_path / f"{name}.laz", town.xyz + shift, town.classification)
-    footprints = str(write_footprints(tmp_path / "footprints.geojson", before.footprints))
-    reconstruct_area(Request((str(tmp_path / "first.laz"),), tmp_path / "run", footprints))
-    second = (str(tmp_path / "second.laz"),)
-    summary = update_area(
-        UpdateRequest(second, tmp_path / "out", run=tmp_path / "run", date=DATE),
-        {"read": {"shift": "0.8,0.3,0.5"}},
-    )
+    given = {"read": {"shift": "0.8,0.3,0.5"}}
+    summary = compare(tmp_path, before, after, (0.0, [0.8, 0.3, 0.5]), given)
     assert summary.outside == {"extended": 1}
     roof = json.loads((tmp_path / "out" / "parameters.jsonl").read_text().splitlines()[0])
     (ring,) = roof["update"]["roofs_outside"][0]["outlines"][0]
-    box = shapely.transform(shapely.box(20, 12, 24, 20), lambda xy: xy + ORIGIN[:2])
+    box = place((20, 12, 24, 20))
     common = shapely.intersection(shapely.Polygon(ring), box).area
     assert common > 0.75 * max(box.area, shapely.Polygon(ring).area)
 
@@ -191,16 +151,16 @@ def test_an_extension_of_three_metres_is_found_wherever_it_lies(aside, tmp_path)
     """Its cells beside the outline count where those beyond them are few."""
     before, after = make_town(houses=1), make_town(houses=1, seed=7)
     put_block(after, (20, 12, 22.8, 20))
-    for name, town in (("first", before), ("second", after)):
-        write_cloud(tmp_path / f"{name}.laz", town.xyz + [aside, aside, 0], town.classification)
-    outlines = {
-        id: shapely.transform(f, lambda xy: xy + aside) for id, f in before.footprints.items()
-    }
-    footprints = str(write_footprints(tmp_path / "footprints.geojson", outlines))
-    reconstruct_area(Request((str(tmp_path / "first.laz"),), tmp_path / "run", footprints))
-    second = (str(tmp_path / "second.laz"),)
-    summary = update_area(UpdateRequest(second, tmp_path / "out", run=tmp_path / "run", date=DATE))
-    assert summary.outside == {"extended": 1}
+    move_outlines(before, aside)
+    shifts = ([aside, aside, 0],) * 2
+    assert compare(tmp_path, before, after, shifts).outside == {"extended": 1}
+
+
+def move_outlines(town, aside, inwards_m=0.0):
+    """Move all outlines to the north-east, and draw them in."""
+    for id, outline in town.footprints.items():
+        wall = shapely.buffer(outline, -inwards_m, join_style="mitre")
+        town.footprints[id] = shapely.transform(wall, lambda xy: xy + aside)
 
 
 @pytest.mark.parametrize("aside", [0.1, 0.3, 0.5, 0.7, 0.9])
@@ -208,17 +168,9 @@ def test_eaves_hide_no_small_extension(aside, tmp_path):
     """Of 10 m2 beside a wall, 2.5 m deep, the earlier survey shows eaves over 0.4 m."""
     before, after = (make_town(houses=1, seed=seed, density=8.0) for seed in (0, 7))
     put_block(after, (20, 13, 22.1, 17))
-    for name, town in (("first", before), ("second", after)):
-        write_cloud(tmp_path / f"{name}.laz", town.xyz + [aside, aside, 0], town.classification)
-    walls = {
-        id: shapely.transform(shapely.buffer(f, -0.4, join_style="mitre"), lambda xy: xy + aside)
-        for id, f in before.footprints.items()
-    }
-    footprints = str(write_footprints(tmp_path / "footprints.geojson", walls))
-    reconstruct_area(Request((str(tmp_path / "first.laz"),), tmp_path / "run", footprints))
-    second = (str(tmp_path / "second.laz"),)
-    summary = update_area(UpdateRequest(second, tmp_path / "out", run=tmp_path / "run", date=DATE))
-    assert summary.outside == {"extended": 1}
+    move_outlines(before, aside, 0.4)
+    shifts = ([aside, aside, 0],) * 2
+    assert compare(tmp_path, before, after, shifts).outside == {"extended": 1}
 
 
 @pytest.mark.parametrize("densities", [(8.0, 1.0), (1.0, 1.0), (1.0, 8.0)])
@@ -231,15 +183,8 @@ def test_roofs_outside_are_found_in_sparse_surveys(densities, tmp_path):
     put_block(before, (40, 28, 46, 34))
     for block in ((5, 28, 11, 34), (20, 12, 25, 18)):
         put_block(after, block)
-    for name, town in (("first", before), ("second", after)):
-        write_cloud(tmp_path / f"{name}.laz", town.xyz, town.classification)
-    footprints = str(write_footprints(tmp_path / "footprints.geojson", before.footprints))
-    reconstruct_area(Request((str(tmp_path / "first.laz"),), tmp_path / "run", footprints))
-    second = (str(tmp_path / "second.laz"),)
-    summary = update_area(UpdateRequest(second, tmp_path / "out", run=tmp_path / "run", date=DATE))
-    assert summary.outside == {"built": 1, "demolished": 1, "extended": 1}
-    with (tmp_path / "out" / "changes.csv").open() as file:
-        areas = [float(r["area_m2"]) for r in csv.DictReader(file) if r["class"] == "outside"]
+    assert compare(tmp_path, before, after).outside == {"built": 1, "demolished": 1, "extended": 1}
+    areas = [float(row["area_m2"]) for row in read_outside(tmp_path)]
     assert sorted(areas) == pytest.approx([30, 36, 36], rel=0.35)
 
 

@@ -5,44 +5,28 @@ import shutil
 
 import numpy as np
 import pytest
-import shapely
 
 from hiproof import InputError, SettingsError
-from hiproof.city.request import Request
-from hiproof.city.run import reconstruct_area
 from hiproof.parametric.run import build_file
 from hiproof.update.before import find_largest_chance
 from hiproof.update.refine import combine_sigmas
-from hiproof.update.request import UpdateRequest
 from hiproof.update.run import update_area
 from run_records import by_id, records
-from tiny_town import make_town, write_cloud
-
-DATE = "2024-05-01"
-
-
-@pytest.fixture(scope="module")
-def make_request(town_files, tmp_path_factory):
-    """A request to update the tiny town, of which house-1 was raised since."""
-    folder, later = tmp_path_factory.mktemp("refine"), make_town(seed=7)
-    x, y = later.xyz[:, :2].T
-    raised = shapely.intersects_xy(later.footprints["house-1"], x, y) & (later.classification == 6)
-    later.xyz[raised, 2] += 2.0
-    cloud = str(write_cloud(folder / "later.laz", later.xyz, later.classification))
-    reconstruct_area(Request((town_files[0],), folder / "run", town_files[1]))
-
-    def make(out, run=folder / "run", **options):
-        parameters = str(run / "parameters.jsonl")
-        return UpdateRequest(
-            (cloud,), out, run=run, run_parameters=parameters, date=DATE, **options
-        )
-
-    return make
+from tiny_town import make_town
+from tiny_updates import DATE, make_request, raise_house
 
 
 @pytest.fixture(scope="module")
-def refinement(make_request, tmp_path_factory):
-    request = make_request(tmp_path_factory.mktemp("refined"), refine=True)
+def cloud(tmp_path_factory):
+    """A cloud of the tiny town, of which house-1 was raised."""
+    later = make_town(seed=7)
+    raise_house(later, "house-1", 2.0)
+    return later.write(tmp_path_factory.mktemp("refine") / "later.laz")
+
+
+@pytest.fixture(scope="module")
+def refinement(town_run, cloud, tmp_path_factory):
+    request = make_request(town_run, cloud, tmp_path_factory.mktemp("refined"), refine=True)
     return update_area(request), by_id(request.run), by_id(request.out), request
 
 
@@ -81,8 +65,8 @@ def test_more_points_lessen_the_share_of_their_scatter_alone():
     assert result["height"] == pytest.approx((0.02**2 + 0.05**2 - 0.03**2) ** 0.5)
 
 
-def test_refining_without_the_earlier_points_is_refused(make_request, tmp_path):
-    run = shutil.copytree(make_request(tmp_path).run, tmp_path / "run")
+def test_refining_without_the_earlier_points_is_refused(town_run, cloud, tmp_path):
+    run = shutil.copytree(town_run, tmp_path / "run")
     record = json.loads((run / "run.json").read_text())
     record["inputs"]["clouds"] = ["gone.laz"]
     (run / "run.json").write_text(json.dumps(record))
@@ -90,17 +74,17 @@ def test_refining_without_the_earlier_points_is_refused(make_request, tmp_path):
         pytest.warns(UserWarning, match="models alone"),
         pytest.raises(InputError, match="leave out --refine"),
     ):
-        update_area(make_request(tmp_path / "out", run=run, refine=True))
+        update_area(make_request(run, cloud, tmp_path / "out", refine=True))
 
 
-def test_the_largest_chance_follows_from_the_chances_of_all_houses(make_request, tmp_path):
-    summary = update_area(make_request(tmp_path, significance_over="city"))
+def test_the_largest_chance_follows_from_the_chances_of_all_houses(town_run, cloud, tmp_path):
+    summary = update_area(make_request(town_run, cloud, tmp_path, significance_over="city"))
     assert summary.by_change == {"unchanged": 3, "changed": 1}
     record = json.loads((tmp_path / "run.json").read_text())["update"]
     assert record["significance_over"] == "city"
     assert record["largest_chance"] == pytest.approx(0.001 / 4)
     with pytest.raises(SettingsError, match="buildings or city"):
-        update_area(make_request(tmp_path / "out", significance_over="country"))
+        update_area(make_request(town_run, cloud, tmp_path, significance_over="country"))
 
 
 def test_of_changes_called_by_benjamini_and_hochberg_few_are_false():

@@ -15,10 +15,10 @@ from hiproof.errors import InputWarning
 from hiproof.evaluate.run import evaluate_run
 from hiproof.parametric.run import build_file
 from hiproof.update.dates import choose_clouds
-from hiproof.update.request import UpdateRequest
 from hiproof.update.run import update_area
 from run_records import by_id, records
-from tiny_town import ORIGIN, make_town, write_cloud, write_footprints
+from tiny_town import make_town, write_footprints
+from tiny_updates import lay_bare, make_request, raise_house
 
 RAISED_M = 2.0
 YEARS = {"house-0": "1990", "house-1": "2019", "house-2": "1990", "house-3": "2019"}
@@ -28,16 +28,12 @@ YEARS = {"house-0": "1990", "house-1": "2019", "house-2": "1990", "house-3": "20
 def surveys(tmp_path_factory):
     """Two surveys of the tiny town: house-1 was raised, and the later one misses house-2."""
     folder, first, second = tmp_path_factory.mktemp("surveys"), make_town(), make_town(seed=7)
-    x, y = second.xyz[:, :2].T
-    raised, missed = (
-        shapely.intersects_xy(second.footprints[name], x, y) for name in ("house-1", "house-2")
-    )
-    second.xyz[raised & (second.classification == 6), 2] += RAISED_M
-    keep = ~missed
+    raise_house(second, "house-1", RAISED_M)
+    second = second.select(~second.lie_in(second.footprints["house-2"]))
     second.xyz[:, 2] += 0.3  # the later survey lies higher on the whole
-    for name, town, kept in (("2014", first, slice(None)), ("2020-05-01", second, keep)):
+    for name, town in (("2014", first), ("2020-05-01", second)):
         (folder / name).mkdir()
-        write_cloud(folder / name / "tile.laz", town.xyz[kept], town.classification[kept])
+        town.write(folder / name / "tile.laz")
     write_footprints(folder / "footprints.geojson", first.footprints)
     collection = json.loads((folder / "footprints.geojson").read_text())
     for feature in collection["features"]:
@@ -74,13 +70,10 @@ def test_a_house_that_the_newest_survey_shows_pulled_down_has_no_older_model(tmp
     first, second = make_town(), make_town(seed=7)
     x0, y0, x1, y1 = first.footprints["house-0"].bounds
     half = shapely.box((x0 + x1) / 2, y0, x1, y1)
-    for area in (half, first.footprints["house-2"]):
-        bare = shapely.intersects_xy(area, *second.xyz[:, :2].T)
-        second.xyz[bare, 2] = ORIGIN[2] + 0.01 * (second.xyz[bare, 0] - ORIGIN[0])
-        second.classification[bare] = 2
+    lay_bare(second, "house-0", 0.5), lay_bare(second, "house-2", 0.0)
     for name, town in (("2014", first), ("2020-05-01", second)):
         (tmp_path / name).mkdir()
-        write_cloud(tmp_path / name / "tile.laz", town.xyz, town.classification)
+        town.write(tmp_path / name / "tile.laz")
     write_footprints(tmp_path / "footprints.geojson", first.footprints)
     found = run(tmp_path, tmp_path / "out")
     assert [id for id, row in found.items() if not row.get("parts")] == ["house-2"]
@@ -108,15 +101,9 @@ def test_an_update_compares_each_house_with_the_surveys_of_its_model(
 ):
     """The first survey shows house-1 as it was before its model, and lies 0.3 m lower."""
     town = make_town(seed=9)
-    raised = shapely.intersects_xy(town.footprints["house-1"], *town.xyz[:, :2].T)
-    town.xyz[raised & (town.classification == 6), 2] += raised_m
-    town.xyz[:, 2] += 0.5
-    cloud = str(write_cloud(tmp_path / "third.laz", town.xyz, town.classification))
-    parameters = str(houses[1] / "parameters.jsonl")
-    request = UpdateRequest(
-        (cloud,), tmp_path / "out", run=houses[1], run_parameters=parameters, date="2024-05-01"
-    )
-    summary = update_area(request)
+    raise_house(town, "house-1", raised_m)
+    cloud = town.write(tmp_path / "third.laz", [0.0, 0.0, 0.5])
+    summary = update_area(make_request(houses[1], cloud, tmp_path / "out"))
     assert summary.by_change == expected
     assert summary.surveys.shift.clear_xyz[2] == pytest.approx(0.2, abs=0.03)
     if raised_m == 0.0:
@@ -195,8 +182,7 @@ def test_a_shift_without_surveys_is_refused(surveys, tmp_path):
 
 @pytest.mark.parametrize("crs", ["EPSG:25832", "EPSG:2225"])  # another place; feet
 def test_surveys_in_other_crs_or_units_are_refused(surveys, crs, tmp_path):
-    town = make_town()
-    write_cloud(tmp_path / "tile.laz", town.xyz, town.classification, crs=crs)
+    make_town().write(tmp_path / "tile.laz", crs=crs)
     epochs = [f"--epoch=2014={surveys / '2014'}", f"--epoch=2020={tmp_path / 'tile.laz'}"]
     paths = ["--footprints", str(surveys / "footprints.geojson"), "--out", str(tmp_path / "o")]
     result = CliRunner().invoke(app, ["reconstruct", *epochs, *paths])

@@ -8,16 +8,13 @@ import numpy as np
 import pytest
 import shapely
 
-from hiproof.city.request import Request
-from hiproof.city.run import reconstruct_area
 from hiproof.simulate import random_building
 from hiproof.update.cells import SurveyNoise, compare_points
 from hiproof.update.judge import is_not_covered
-from hiproof.update.request import UpdateRequest
-from hiproof.update.run import update_area
 from hiproof.update.unseen import draw_unseen
 from run_records import by_id
-from tiny_town import ORIGIN, make_town, write_cloud, write_footprints
+from tiny_town import ORIGIN, make_town
+from tiny_updates import run_over, take_class, update
 
 WING = (6.0, 5.0)  # m: its length and width, east of every house but the last
 
@@ -40,29 +37,11 @@ def make_winged(density, seed):
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
     """The folder of a run over the town with wings."""
-    folder = tmp_path_factory.mktemp("run")
-    town, _ = make_winged(8.0, 0)
-    cloud = write_cloud(folder / "first.laz", town.xyz, town.classification)
-    outlines = write_footprints(folder / "outlines.geojson", town.footprints)
-    reconstruct_area(Request((str(cloud),), folder / "models", str(outlines), id_attribute="id"))
-    return folder / "models"
-
-
-def update(run, out, town):
-    cloud = str(write_cloud(out.with_suffix(".laz"), town.xyz, town.classification))
-    parameters = str(run / "parameters.jsonl")
-    request = UpdateRequest((cloud,), out, run=run, run_parameters=parameters, date="2024-05-01")
-    update_area(request)
-    return by_id(out)
-
-
-def take_class(row):
-    return (row.get("change") or {"class": "unchanged"})["class"]
+    return run_over(tmp_path_factory.mktemp("run"), make_winged(8.0, 0)[0])
 
 
 def hide(town, inside):
-    keep = ~inside
-    return dataclasses.replace(town, xyz=town.xyz[keep], classification=town.classification[keep])
+    return town.select(~inside)
 
 
 def raise_unclassified(town, inside):
@@ -81,7 +60,7 @@ def test_a_wing_without_points_of_the_roof_is_not_called_unchanged(
 ):
     town, wings = make_winged(density, seed)
     wing = wings["house-1"]
-    town = change(town, shapely.intersects_xy(wing, *town.xyz[:, :2].T))
+    town = change(town, town.lie_in(wing))
     before, after = by_id(run), update(run, tmp_path / "out", town)
     classes = {id: take_class(row) for id, row in after.items()}
     assert classes == dict.fromkeys(classes, "unchanged") | {"house-1": answer[0]}
@@ -96,7 +75,7 @@ def test_without_the_earlier_clouds_the_model_says_what_could_be_seen(run, tmp_p
     record = json.loads((models / "run.json").read_text().replace("first.laz", "moved.laz"))
     (models / "run.json").write_text(json.dumps(record))
     town, wings = make_winged(6.0, 6)
-    town = hide(town, shapely.intersects_xy(wings["house-2"], *town.xyz[:, :2].T))
+    town = hide(town, town.lie_in(wings["house-2"]))
     with pytest.warns(UserWarning, match="compared with its models alone"):
         after = update(models, tmp_path / "out", town)
     classes = {id: take_class(row) for id, row in after.items()}
@@ -121,7 +100,7 @@ def test_a_survey_covers_the_rubble_of_a_house(run, through, density, tmp_path):
     """Whatever share of the pulses reaches the ground."""
     town, _ = make_winged(density, 4)
     rng, outline = np.random.default_rng(5), town.footprints["house-2"]
-    inside = shapely.intersects_xy(outline.buffer(0.5), *town.xyz[:, :2].T)
+    inside = town.lie_in(outline.buffer(0.5))
     town.xyz[inside, 2] = ORIGIN[2] + rng.uniform(0.0, 7.0, inside.sum())
     on_ground = inside & (rng.random(len(inside)) < through)
     town.xyz[on_ground, 2] = ORIGIN[2]
@@ -135,7 +114,7 @@ def test_a_survey_covers_the_rubble_of_a_house(run, through, density, tmp_path):
 def test_a_survey_that_covers_no_building_is_told(run, tmp_path):
     town, _ = make_winged(4.0, 4)
     boxes = shapely.buffer(list(town.footprints.values()), 2.0)
-    town = hide(town, shapely.intersects_xy(shapely.union_all(boxes), *town.xyz[:, :2].T))
+    town = hide(town, town.lie_in(shapely.union_all(boxes)))
     town.classification[:50] = 6
     with pytest.warns(UserWarning, match="got clouds that cover none;"):
         after = update(run, tmp_path / "out", town)
@@ -145,9 +124,9 @@ def test_a_survey_that_covers_no_building_is_told(run, tmp_path):
 def test_a_changed_house_also_names_its_unseen_wing(run, tmp_path):
     town, wings = make_winged(6.0, 7)
     main = town.footprints["house-1"].difference(wings["house-1"])
-    up = shapely.intersects_xy(main, *town.xyz[:, :2].T) & (town.classification == 6)
+    up = town.lie_in(main) & (town.classification == 6)
     town.xyz[up, 2] += 2.5
-    town = hide(town, shapely.intersects_xy(wings["house-1"], *town.xyz[:, :2].T))
+    town = hide(town, town.lie_in(wings["house-1"]))
     change = update(run, tmp_path / "out", town)["house-1"]["change"]
     assert change["class"] == "changed"
     kinds = [place["kind"] for place in change["places"]]

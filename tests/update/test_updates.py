@@ -22,45 +22,31 @@ from hiproof.evaluate.run import evaluate_run
 from hiproof.parametric.building import build
 from hiproof.parametric.run import build_file
 from hiproof.update.change_tables import write_changes
-from hiproof.update.request import UpdateRequest
 from hiproof.update.run import update_area
 from hiproof.write.fragments import load_fragments, save_fragments
 from run_records import RECORDS, by_id, records
-from tiny_town import ORIGIN, make_town, write_cloud, write_footprints
+from tiny_town import ORIGIN, make_town, write_footprints
+from tiny_updates import DATE, lay_bare, make_request, raise_house, run_over
 
-DATE = "2024-05-01"
 RAISED_M = 2.0
 
 
-def make_later_survey(raised="house-1", gone="house-2"):
+def make_later_survey():
     """The town three years later, by another flight."""
     town = make_town(seed=7)
-    xyz, classes = town.xyz.copy(), town.classification.copy()
-    x, y = xyz[:, :2].T
-    up = shapely.intersects_xy(town.footprints[raised], x, y) & (classes == 6)
-    down = shapely.intersects_xy(town.footprints[gone], x, y)
-    xyz[up, 2] += RAISED_M
-    xyz[down, 2], classes[down] = ORIGIN[2] + 0.01 * (x[down] - ORIGIN[0]), 2
-    return xyz, classes
+    raise_house(town, "house-1", RAISED_M)
+    lay_bare(town, "house-2", 0.0)
+    return town
 
 
 @pytest.fixture(scope="module")
 def cloud(tmp_path_factory):
-    return str(write_cloud(tmp_path_factory.mktemp("later") / "later.laz", *make_later_survey()))
+    return make_later_survey().write(tmp_path_factory.mktemp("later") / "later.laz")
 
 
 @pytest.fixture(scope="module")
-def run(town_files, tmp_path_factory):
-    """The folder of a run over the tiny town."""
-    out = tmp_path_factory.mktemp("models")
-    reconstruct_area(Request((town_files[0],), out, town_files[1]))
-    return out
-
-
-def make_request(models, cloud, folder, **changes):
-    parameters = str(models / "parameters.jsonl")
-    request = UpdateRequest((cloud,), folder, run=models, run_parameters=parameters, date=DATE)
-    return dataclasses.replace(request, **changes)
+def run(town_run):
+    return town_run
 
 
 @pytest.fixture(scope="module")
@@ -119,7 +105,7 @@ def test_a_house_on_ground_that_moved_with_it_stands_on_the_new_ground(run, rise
     west, _, east, _ = town.footprints["house-1"].bounds
     around = (town.xyz[:, 0] > west - 8) & (town.xyz[:, 0] < east + 8)
     town.xyz[around, 2] += rise
-    cloud = str(write_cloud(tmp_path / "later.laz", town.xyz, town.classification))
+    cloud = town.write(tmp_path / "later.laz")
     with pytest.warns(InputWarning, match="lie elsewhere together with the ground"):
         update_area(make_request(run, cloud, tmp_path / "out"))
     before, after = by_id(run)["house-1"], by_id(tmp_path / "out")["house-1"]
@@ -128,17 +114,16 @@ def test_a_house_on_ground_that_moved_with_it_stands_on_the_new_ground(run, rise
 
 
 def test_a_raised_house_with_a_block_on_it_is_no_longer_of_the_earlier_shape(run, tmp_path):
-    xyz, classes = make_later_survey()
-    x0, y0, x1, y1 = make_town(seed=7).footprints["house-1"].bounds
+    town = make_later_survey()
+    x0, y0, x1, y1 = town.footprints["house-1"].bounds
     corner = np.array([x0 + 0.3 * (x1 - x0), y0 + 0.3 * (y1 - y0)])
     block = shapely.box(*corner, *(corner + 4.0))
-    inside = shapely.intersects_xy(block, *xyz[:, :2].T) & (classes == 6)
-    xyz[inside, 2] = xyz[inside, 2].max() + 2.0
-    cloud = str(write_cloud(tmp_path / "block.laz", xyz, classes))
-    update_area(make_request(run, cloud, tmp_path / "out"))
+    inside = town.lie_in(block) & (town.classification == 6)
+    town.xyz[inside, 2] = town.xyz[inside, 2].max() + 2.0
+    update_area(make_request(run, town.write(tmp_path / "block.laz"), tmp_path / "out"))
     model = build(by_id(tmp_path / "out")["house-1"])
     top = model.roof.height_at([corner + 2.0 - model.roof.frame.origin[:2]])[0]
-    assert top + model.roof.frame.origin[2] == pytest.approx(xyz[inside, 2].max(), abs=0.2)
+    assert top + model.roof.frame.origin[2] == pytest.approx(town.xyz[inside, 2].max(), abs=0.2)
 
 
 def test_a_changed_house_keeps_its_passage(run, cloud, tmp_path):
@@ -206,8 +191,7 @@ def test_dates_of_surveys_stand_in_all_files(update):
 def test_dates_and_models_that_ended_live_on(run, update, cloud, tmp_path):
     """A house is raised, and lowered again: its first two models are history."""
     first = update_area(make_request(run, cloud, tmp_path / "first", history=True))
-    town = make_town(seed=9)
-    same = str(write_cloud(tmp_path / "same.laz", town.xyz, town.classification))
+    same = make_town(seed=9).write(tmp_path / "same.laz")
     request = make_request(tmp_path / "first", same, tmp_path / "second", history=True)
     update_area(dataclasses.replace(request, date="2027-05-01"))
     assert first.by_change == update[0].by_change
@@ -309,9 +293,8 @@ def test_an_update_of_an_update_starts_from_its_models(update, cloud, tmp_path):
 def write_survey(path, step_m, seed, missing=None):
     """The town surveyed once more, so much higher, without the points of a house."""
     town = make_town(seed=seed)
-    x, y = town.xyz[:, :2].T
-    keep = ~shapely.intersects_xy(town.footprints[missing], x, y) if missing else slice(None)
-    return str(write_cloud(path, town.xyz[keep] + [0, 0, step_m], town.classification[keep]))
+    keep = ~town.lie_in(town.footprints[missing]) if missing else slice(None)
+    return town.select(keep).write(path, [0, 0, step_m])
 
 
 def test_the_shift_of_a_survey_is_taken_off_wherever_its_points_are_used(run, tmp_path):
@@ -334,14 +317,10 @@ def test_the_shift_of_a_survey_is_taken_off_wherever_its_points_are_used(run, tm
 def test_a_town_that_rose_and_a_survey_without_ground_are_not_taken_for_a_shift_in_silence(
     tmp_path,
 ):
-    first, second = make_town(houses=8), make_town(houses=8, seed=7)
-    cloud = write_cloud(tmp_path / "first.laz", first.xyz, first.classification)
-    outlines = write_footprints(tmp_path / "outlines.geojson", first.footprints)
-    reconstruct_area(Request((str(cloud),), tmp_path / "run", str(outlines)))
-    roofs = second.classification == 6
-    raised = second.xyz[roofs] + [0.0, 0.0, 0.6]
-    later = str(write_cloud(tmp_path / "later.laz", raised, second.classification[roofs]))
-    request = make_request(tmp_path / "run", later, tmp_path / "auto")
+    run, second = run_over(tmp_path, make_town(houses=8)), make_town(houses=8, seed=7)
+    roofs = second.select(second.classification == 6)
+    later = roofs.write(tmp_path / "later.laz", [0.0, 0.0, 0.6])
+    request = make_request(run, later, tmp_path / "auto")
     remark = r"shift of \+0\.60 m in height rests on roofs alone \(8 of"
     with pytest.warns(UserWarning, match=remark):
         update_area(request)
@@ -364,10 +343,8 @@ def test_without_its_clouds_a_run_is_compared_by_its_models(run, cloud, tmp_path
 def test_overrides_of_the_run_hold_for_what_changed(town_files, cloud, tmp_path):
     known = tmp_path / "known.jsonl"
     known.write_text('{"id": "house-1", "type": "hip"}\n{"id": "house-2", "type": "hip"}\n')
-    overrides = str(known)
-    reconstruct_area(
-        Request((town_files[0],), tmp_path / "run", town_files[1], overrides=overrides)
-    )
+    given = {"overrides": str(known)}
+    reconstruct_area(Request((town_files[0],), tmp_path / "run", town_files[1], **given))
     summary = update_area(make_request(tmp_path / "run", cloud, tmp_path / "out"))
     assert summary.by_change == {"unchanged": 2, "changed": 1, "gone": 1}
     house = by_id(tmp_path / "out")["house-1"]
@@ -414,19 +391,21 @@ def test_a_report_without_the_earlier_run_draws_no_changes(update, tmp_path):
 
 
 def test_bad_input_is_refused_in_a_sentence(run, cloud, tmp_path):
-    run = shutil.copytree(run, tmp_path / "run")
-    xyz, classes = make_later_survey()
+    run, east = shutil.copytree(run, tmp_path / "run"), np.array([5000.0, 0.0, 0.0])
+    later = make_later_survey()
+    far = later.write(tmp_path / "far.laz", east, origin=ORIGIN + east)
+    other = later.write(tmp_path / "utm.laz", crs="EPSG:25832")
     cases = [
         (dict(out=run), OutputError, "never changes its run"),
         (dict(significance=0.0), SettingsError, "between 0 and 1"),
         (dict(date="May 2024"), InputError, "--date 2014-02-09"),
         (dict(run=tmp_path), InputError, "finished run"),
-        (dict(clouds=(far_cloud(tmp_path, xyz, classes),)), InputError, "which lie in"),
-        (dict(clouds=(other_crs(tmp_path, xyz, classes),)), InputError, "in the CRS of"),
+        (dict(clouds=(far,)), InputError, "which lie in"),
+        (dict(clouds=(other,)), InputError, "in the CRS of"),
     ]
     for change, error, text in cases:
         with pytest.raises(error, match=text):
-            update_area(make_request(run, cloud, tmp_path / "out", **change))
+            update_area(dataclasses.replace(make_request(run, cloud, tmp_path / "out"), **change))
     lines = (run / "parameters.jsonl").read_text().splitlines()
     lines[2] = lines[2].replace('"type":"gable"', '"type":"igloo"')
     (run / "parameters.jsonl").write_text("\n".join(lines) + "\n")
@@ -439,7 +418,7 @@ def test_a_survey_that_took_the_place_of_the_earlier_file_is_refused(town_files,
     """Compared with itself it would show no change."""
     cloud = shutil.copy(town_files[0], tmp_path / "tile.laz")
     reconstruct_area(Request((str(cloud),), tmp_path / "run", town_files[1]))
-    write_cloud(cloud, *make_later_survey())
+    make_later_survey().write(cloud)
     link = tmp_path / "link.laz"
     link.symlink_to(cloud)
     for same in (cloud, link, tmp_path / "run" / ".." / "tile.laz"):
@@ -462,27 +441,16 @@ def test_what_changed_most_comes_first_where_an_outline_grew(run, tmp_path):
     town = make_town(seed=7)
     house = town.footprints["house-1"]
     wing = shapely.affinity.translate(house, 0.0, house.bounds[3] - house.bounds[1])
-    xyz, classes = town.xyz.copy(), town.classification.copy()
-    x, y = xyz[:, :2].T
-    inside = shapely.intersects_xy(wing, x, y)
-    xyz[inside, 2], classes[inside] = ORIGIN[2] + 3.5, 6
-    xyz[shapely.intersects_xy(house.centroid.buffer(1.5, 1), x, y), 2] += 1.5
+    inside = town.lie_in(wing)
+    town.xyz[inside, 2], town.classification[inside] = ORIGIN[2] + 3.5, 6
+    town.xyz[town.lie_in(house.centroid.buffer(1.5, 1)), 2] += 1.5
     outlines = {"large": shapely.union_all([house, wing], grid_size=0.01)}
     files = draw_footprints(tmp_path, outlines)
-    grown = str(write_cloud(tmp_path / "grown.laz", xyz, classes))
+    grown = town.write(tmp_path / "grown.laz")
     update_area(make_request(run, grown, tmp_path / "out", footprints=files))
     places = by_id(tmp_path / "out")["house-1"]["change"]["places"]
     assert places[0]["kind"] == "outline_changed"
     assert len(places) > 1
-
-
-def far_cloud(folder, xyz, classes):
-    far = xyz + (5000.0, 0.0, 0.0)
-    return str(write_cloud(folder / "far.laz", far, classes, origin=ORIGIN + (5000.0, 0.0, 0.0)))
-
-
-def other_crs(folder, xyz, classes):
-    return str(write_cloud(folder / "utm.laz", xyz, classes, crs="EPSG:25832"))
 
 
 def draw_footprints(folder, outlines):
@@ -500,8 +468,7 @@ def test_new_footprints_keep_ids_and_name_predecessors(run, cloud, tmp_path):
         "A2-east": shapely.box((x0 + x1) / 2, y0, x1, y1),
         "yard": shapely.box(x1 + 4, y0, x1 + 9, y1),
     }
-    later = make_town(seed=7)
-    same = str(write_cloud(tmp_path / "same.laz", later.xyz, later.classification))
+    same = make_town(seed=7).write(tmp_path / "same.laz")
     request = make_request(run, same, tmp_path / "out", footprints=draw_footprints(tmp_path, names))
     update_area(dataclasses.replace(request, id_attribute="id"))
     rows = by_id(tmp_path / "out")
@@ -519,14 +486,15 @@ def test_new_footprints_keep_ids_and_name_predecessors(run, cloud, tmp_path):
     assert "A2-east,changed,split" in text and ",house-2" in text
 
 
-def test_a_building_whose_footprint_was_moved_keeps_its_place_and_shift(town_files, tmp_path):
+def test_a_building_whose_footprint_was_moved_keeps_its_place_and_shift(
+    town_files, cloud, tmp_path
+):
     town = make_town()
     beside = {id: shapely.affinity.translate(p, 1.2, -0.8) for id, p in town.footprints.items()}
     footprints = draw_footprints(tmp_path, beside)
     reconstruct_area(Request((town_files[0],), tmp_path / "run", footprints, id_attribute="id"))
     rows = by_id(tmp_path / "run")
     assert any(rows["house-1"]["shift"])
-    cloud = str(write_cloud(tmp_path / "later.laz", *make_later_survey()))
     update_area(make_request(tmp_path / "run", cloud, tmp_path / "out"))
     after = by_id(tmp_path / "out")
     assert after["house-0"] == rows["house-0"]

@@ -3,16 +3,13 @@
 import shutil
 import warnings
 
-import numpy as np
 import pytest
 import shapely
 
-from hiproof.city.request import Request
-from hiproof.city.run import reconstruct_area
 from hiproof.errors import InputError
-from hiproof.update.request import UpdateRequest
 from hiproof.update.run import update_area
-from tiny_town import make_town, write_cloud, write_footprints
+from tiny_town import make_town, write_footprints
+from tiny_updates import make_request, run_over
 
 HOUSES = 9
 
@@ -20,26 +17,19 @@ HOUSES = 9
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
     """The folder of a run over a town of nine houses, beside its cloud."""
-    folder, town = tmp_path_factory.mktemp("run"), make_town(HOUSES, 3.0)
-    cloud = write_cloud(folder / "first.laz", town.xyz, town.classification)
-    outlines = write_footprints(folder / "outlines.geojson", town.footprints)
-    reconstruct_area(Request((str(cloud),), folder / "models", str(outlines), id_attribute="id"))
-    return folder / "models"
+    return run_over(tmp_path_factory.mktemp("run"), make_town(HOUSES, 3.0))
 
 
 def update(run, out, cloud, changes=None, **options):
     """Return the texts of an update's warnings, and its buildings by class."""
-    parameters = str(run / "parameters.jsonl")
-    options |= {"run": run, "run_parameters": parameters, "date": "2024-05-01"}
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        summary = update_area(UpdateRequest((str(cloud),), out, **options), changes)
+        summary = update_area(make_request(run, str(cloud), out, **options), changes)
     return [str(w.message) for w in caught], summary.by_change
 
 
 def write_later(folder, aside=(0.0, 0.0, 0.0)):
-    town = make_town(HOUSES, 3.0, seed=5)
-    return write_cloud(folder / "later.laz", town.xyz + np.array(aside), town.classification)
+    return make_town(HOUSES, 3.0, seed=5).write(folder / "later.laz", aside)
 
 
 def test_a_survey_and_outlines_as_they_should_be_get_no_warning(run, tmp_path):
@@ -104,7 +94,7 @@ def test_houses_built_anew_beside_where_they_stood_are_no_shift(run, tmp_path):
     """Their new outlines lie on their new roofs."""
     town = make_town(HOUSES, 3.0, seed=5)
     town.xyz[town.classification == 6, 0] += 1.3
-    cloud = write_cloud(tmp_path / "later.laz", town.xyz, town.classification)
+    cloud = town.write(tmp_path / "later.laz")
     outlines = {id: shapely.affinity.translate(o, 1.3) for id, o in town.footprints.items()}
     given = {"footprints": str(write_footprints(tmp_path / "new.geojson", outlines))}
     _, classes = update(run, tmp_path / "out", cloud, {"read": {"shift": "off"}}, **given)
