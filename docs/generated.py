@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import hiproof
-from hiproof.cli.app import app
+from hiproof.cli.app import import_command
 from hiproof.cli.parameters import COMMANDS
 from hiproof.settings import Settings, toml_value
 
@@ -33,9 +33,8 @@ def on_files(files: Any, config: Any) -> Any:
 
 def describe_commands() -> str:
     """Describe every command: its purpose, its arguments, its options."""
-    commands = app.commands  # type: ignore[attr-defined]
     return "# Commands\n\n`hiproof COMMAND --help` prints the same.\n" + "".join(
-        describe_command(name, command) for name, command in sorted(commands.items())
+        describe_command(name, import_command(name)) for name in sorted(COMMANDS)
     )
 
 

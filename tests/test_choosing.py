@@ -13,7 +13,7 @@ from click.testing import CliRunner
 from hiproof.city.plan.prepare import make_plan
 from hiproof.city.request import Request
 from hiproof.city.run import reconstruct_area
-from hiproof.cli.app import app
+from hiproof.cli.app import app, import_command
 from hiproof.cli.reconstruct import find_settings_file
 from hiproof.errors import InputError, SettingsError
 from hiproof.read.outlines.footprints import read_footprints
@@ -22,7 +22,7 @@ from layers import write_layer
 from run_records import by_id
 from tiny_town import write_cloud
 
-PARAMETERS = {p.name: p for p in app.commands["reconstruct"].params}
+PARAMETERS = {p.name: p for p in import_command("reconstruct").params}
 OPTIONED = [p for p in PARAMETERS.values() if getattr(p, "setting", None)]
 HOUSES = {f"house-{i}": shapely.box(20 * i, 0, 20 * i + 10, 8) for i in range(5)}
 

@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 from hiproof import progress
-from hiproof.cli.app import app
+from hiproof.cli.app import app, import_command
 from hiproof.cli.command import choose_level
 from hiproof.cli.parameters import COMMANDS
 from hiproof.compiled import news
@@ -21,7 +21,7 @@ from programs import run_python
 from sample_models import sample_points, write_sample_run
 
 GROUPS = ["Reconstruct", "Inspect", "Edit", "Export", "Network"]
-COMMAND_LINE = app.commands
+COMMAND_LINE = {name: import_command(name) for name in app.commands}
 
 
 def invoke(*arguments, **options):

@@ -14,7 +14,7 @@ import pytest
 import shapely
 
 import hiproof
-from hiproof.cli.app import app
+from hiproof.cli.app import app, import_command
 from hiproof.enrich.run import enrich_run
 from hiproof.settings import EnrichSettings, Settings
 from hiproof.simulate import demo_files
@@ -26,7 +26,7 @@ PAGES = {
     for path in (ROOT / "README.md", *(ROOT / "docs").rglob("*.md"))
     if (blocks := re.findall(r"```python\n(.*?)```", path.read_text(encoding="utf-8"), re.DOTALL))
 }
-COMMANDS = app.commands
+COMMANDS = {name: import_command(name) for name in app.commands}
 MODULES = {
     m.name: Path(m.module_finder.find_spec(m.name).origin)
     for m in pkgutil.walk_packages(hiproof.__path__, "hiproof.")

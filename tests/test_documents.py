@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from hiproof.cli.app import app
+from hiproof.cli.app import app, import_command
 from hiproof.settings import Settings
 from hiproof.write.attribute_list import TABLES
 
@@ -17,7 +17,7 @@ DOCUMENTS = [
 DOCUMENTS += sorted((ROOT / "docs").rglob("*.md"))
 # by docs/generated.py and docs/demo_in_3d.py, when the site is built
 MADE = ("commands.md", "settings.md", "constants.md", "demo/index.html")
-COMMANDS = app.commands
+COMMANDS = {name: import_command(name) for name in app.commands}
 OPTIONS = {
     name
     for command in COMMANDS.values()

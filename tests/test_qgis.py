@@ -10,12 +10,13 @@ from pathlib import Path
 
 import pytest
 
-from hiproof.cli.app import app
+from hiproof.cli.app import app, import_command
 from hiproof.formats import FORMATS, choose_format
 from hiproof.simulate import demo_files
 
 PLUGINS = Path(__file__).parents[1] / "qgis"
-COMMANDS = dict(app.commands)  # imported now, before the plugin
+# imported now, before the plugin
+COMMANDS = {name: import_command(name) for name in app.commands}
 # Debian's script around the program adds an option that the program of QGIS 3.22 does not know
 QGIS = shutil.which("qgis_process.bin") or shutil.which("qgis_process")
 

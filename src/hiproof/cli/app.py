@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import textwrap
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import groupby
 from typing import Any
@@ -23,27 +23,11 @@ LONGEST_COMPLAINT = 500  # characters of a complaint about wrong usage: a few li
 import_command = functools.cache(make_command)
 
 
-class CommandTable(Mapping[str, Any]):
-    """All commands by name; each is imported when it is looked up."""
-
-    def __getitem__(self, name: str) -> Command:
-        if name not in COMMANDS:
-            raise KeyError(name)
-        return import_command(name)
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(COMMANDS)
-
-    def __len__(self) -> int:
-        return len(COMMANDS)
-
-
 class Commands(click.Group):
     """The commands in groups; complaints about wrong usage hold no password of an argument."""
 
-    def __init__(self, **attributes: Any) -> None:
-        super().__init__(**attributes)
-        self.commands = CommandTable()  # type: ignore[assignment]
+    def get_command(self, ctx: Any, name: str) -> Command | None:
+        return import_command(name) if name in COMMANDS else None
 
     def list_commands(self, ctx: Any) -> list[str]:
         return list(COMMANDS)
@@ -87,6 +71,7 @@ def mask_complaints() -> Iterator[None]:
 
 app = Commands(
     name="hiproof",
+    commands=COMMANDS,  # type: ignore[arg-type]
     help="Turn airborne LiDAR point clouds into watertight, semantic, parametric LoD2 models.",
     no_args_is_help=True,
     params=[

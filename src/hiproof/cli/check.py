@@ -14,6 +14,7 @@ import click
 from ..errors import escape_unseen
 from ..log import count_things
 from ..progress import Update, show_progress
+from ..read.models.damage import SkippedBuildings
 
 
 @dataclass
@@ -21,41 +22,37 @@ class CheckedFile:
     """The result of checking a file: counts, and solids by the rules (val3dity) they break."""
 
     path: Path
+    damaged: SkippedBuildings = field(default_factory=SkippedBuildings)
     solids: int = 0
-    damaged: int = 0
-    by_code: Counter[int] = field(default_factory=Counter)
     findings: list[tuple[str, tuple[Any, ...]]] = field(default_factory=list)
 
-    @property
-    def invalid(self) -> int:
-        return len(self.findings)
-
-    def describe(self) -> str:
-        """Count the solids in a line."""
-        codes = "".join(f", {n} with code {code}" for code, n in sorted(self.by_code.items()))
-        damaged = (
-            f", {count_things(self.damaged, 'damaged building')} left out" if self.damaged else ""
-        )
-        return (
-            f"{self.path}: {count_things(self.solids, 'solid')}, {self.solids - self.invalid} "
-            f"valid, {self.invalid} invalid{codes}{damaged}"
-        )
-
     def to_dict(self) -> dict[str, Any]:
-        """Return the same for `--json`, with every finding."""
+        """Return the counts for `--json`, with every finding."""
+        by_code = Counter(
+            code for _, findings in self.findings for code in {finding.code for finding in findings}
+        )
         return {
             "file": str(self.path),
             "solids": self.solids,
-            "valid": self.solids - self.invalid,
-            "invalid": self.invalid,
-            "damaged": self.damaged,
-            "by_code": {str(code): n for code, n in sorted(self.by_code.items())},
+            "valid": self.solids - len(self.findings),
+            "invalid": len(self.findings),
+            "damaged": self.damaged.count,
+            "by_code": {str(code): n for code, n in sorted(by_code.items())},
             "findings": [
                 {"id": id, "code": finding.code, "message": finding.message}
                 for id, findings in self.findings
                 for finding in findings
             ],
         }
+
+    def describe(self) -> str:
+        """Count the solids in a line."""
+        counts = self.to_dict()
+        codes = "".join(f", {n} with code {code}" for code, n in counts["by_code"].items())
+        return (
+            f"{self.path}: {count_things(self.solids, 'solid')}, {counts['valid']} valid, "
+            f"{counts['invalid']} invalid{codes}{self.damaged.describe()}"
+        )
 
 
 def check(files: list[Path], *, planarity: float = 0.01, as_json: bool = False) -> int:
@@ -74,7 +71,7 @@ def check(files: list[Path], *, planarity: float = 0.01, as_json: bool = False) 
 
 def count_bad(checked: list[CheckedFile]) -> int:
     """Count the solids that are invalid and the buildings that are damaged."""
-    return sum(file.invalid + file.damaged for file in checked)
+    return sum(len(file.findings) + file.damaged.count for file in checked)
 
 
 def check_file(
@@ -85,19 +82,16 @@ def check_file(
 ) -> CheckedFile:
     """Print a line for each invalid solid of a file, and a count at the end."""
     from ..compose import check_solid
-    from ..read.models.damage import SkippedBuildings
     from ..read.models.solids import read_solids
 
-    result, left_out = CheckedFile(path), SkippedBuildings()
-    for id, solid in read_solids(path, left_out):
+    result = CheckedFile(path)
+    for id, solid in read_solids(path, result.damaged):
         result.solids += 1
         update("check", result.solids)
         findings = check_solid(solid, planarity_m=planarity_m)
         if findings:
             result.findings.append((id, findings))
-            result.by_code.update({finding.code for finding in findings})
             text = "; ".join(finding.message for finding in findings[:3])
             say(escape_unseen(f"{path}: {id}: {text}"))
-    result.damaged = left_out.count
     say(result.describe())
     return result

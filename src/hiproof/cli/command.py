@@ -21,6 +21,7 @@ from .parameters import (
     COMMANDS,
     MAIN_HEADING,
     HeadedOption,
+    ShownArgument,
     collect_changes,
     list_parameters,
     list_setting_options,
@@ -50,8 +51,8 @@ class Command(click.Command):
             return
         by_name = {param.name: param for param in self.get_params(ctx)}
         shown = [by_name[name] for name in (*first, "help") if name in by_name]
-        arguments = groups.pop("Arguments", [])
-        write_parameters(formatter, "Arguments", arguments, ctx)
+        arguments = groups.pop(ShownArgument.heading, [])
+        write_parameters(formatter, ShownArgument.heading, arguments, ctx)
         write_parameters(formatter, MAIN_HEADING, shown, ctx)
         more = row.get("more", "")
         names = {param.name for param in shown}
@@ -68,11 +69,9 @@ class Command(click.Command):
 
     def group_parameters(self, ctx: Any) -> dict[str, list[Any]]:
         """Return all parameters under their headings."""
-        groups: dict[str, list[Any]] = {"Arguments": [], MAIN_HEADING: []}
+        groups: dict[str, list[Any]] = {ShownArgument.heading: [], MAIN_HEADING: []}
         for param in self.get_params(ctx):
-            is_argument = param.param_type_name == "argument"
-            heading = "Arguments" if is_argument else getattr(param, "heading", MAIN_HEADING)
-            groups.setdefault(heading, []).append(param)
+            groups.setdefault(getattr(param, "heading", MAIN_HEADING), []).append(param)
         return {heading: group for heading, group in groups.items() if group}
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from ..errors import InputError, OutputError
+from ..errors import InputError
 from ..formats import CONVERTED, choose_format
 from ..log import count_things
 from ..progress import Update, count_progress, show_progress
@@ -33,7 +33,7 @@ def convert(
     out, or unusable input.
     """
     from ..evaluate.run import list_run_inputs
-    from ..write.files import refuse_overwriting, refuse_run_file
+    from ..write.files import refuse_replacing, suggest_elsewhere
 
     name = format.value if format else name_format(out)
     given = {} if geoid_height is None else {"geoid_height_m": geoid_height}
@@ -42,16 +42,12 @@ def convert(
             f"expected --geoid-height with 3dtiles alone, got it with {name}; leave it out"
         )
     path = out or default_path(source, name)
-    refuse_overwriting([path], [source, *list_run_inputs(source)])
-    refuse_run_file(path)
-    with show_progress("convert") as update:
-        from ..write.files import elsewhere
-
-        try:
-            text, left_out = convert_models(source, path, name, crs, update, **given)
-        except OutputError as error:
-            command = f"hiproof convert {source} OUT"
-            raise elsewhere(error, command) if out is None else error from error
+    refuse_replacing([path], [source, *list_run_inputs(source)])
+    with (
+        show_progress("convert") as update,
+        suggest_elsewhere(f"hiproof convert {source} OUT", out),
+    ):
+        text, left_out = convert_models(source, path, name, crs, update, **given)
     click.echo(text)
     return left_out.exit_code
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from ..errors import InputError, OutputError
+from ..errors import InputError
 from ..log import count_things
 from ..progress import show_progress
 
@@ -56,7 +56,7 @@ def evaluate(
         from ..evaluate.evaluation import summarise, to_csv, to_json
         from ..evaluate.run import evaluate_run
         from ..read.models.damage import SkippedBuildings
-        from ..write.files import atomic_file, elsewhere, refuse_overwriting
+        from ..write.files import refuse_overwriting, save_text, suggest_elsewhere
 
         place = Path(out or folder)
         files = [place / f"evaluation{suffix}" for suffix in (".csv", ".json")]
@@ -68,14 +68,9 @@ def evaluate(
         raise InputError(
             f"expected point files to measure {folder} against, got none; name them after it"
         )
-    try:
-        for path, text in zip(files, (to_csv(run.figures), to_json(run.figures)), strict=True):
-            with atomic_file(path) as file:
-                file.write(text.encode())
-    except OutputError as error:
-        raise (
-            elsewhere(error, f"hiproof evaluate {folder} --out FOLDER") if out is None else error
-        ) from error
+    with suggest_elsewhere(f"hiproof evaluate {folder} --out FOLDER", out):
+        save_text(files[0], to_csv(run.figures))
+        save_text(files[1], to_json(run.figures))
     if as_json:
         click.echo(json.dumps(summarise(run.figures), indent=1, allow_nan=False))
     else:

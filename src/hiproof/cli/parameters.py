@@ -29,6 +29,8 @@ MAIN_HEADING, FURTHER_HEADING = "Options", "Further options"
 class ShownArgument(click.Argument):
     """An argument that the help explains."""
 
+    heading = "Arguments"
+
     def __init__(self, names: list[str], help: str, **attributes: Any) -> None:
         super().__init__(names, **attributes)
         self.help = help

@@ -43,7 +43,12 @@ def reconstruct(
     """
     from .running import run_request
 
-    start_log(log_file, [*(clouds or ()), footprints, terrain, overrides, underpasses, config])
+    if log_file is not None:
+        from ..write.files import refuse_replacing
+
+        given = [*(clouds or ()), footprints, terrain, overrides, underpasses, config]
+        refuse_replacing([log_file], given)
+    start(console_level(), log_file)
     box = None if bbox is None else parse_box(bbox)
     refuse_lone_options(epoch, enrich, changes or {})
 
@@ -87,16 +92,6 @@ def reconstruct(
         answers = with_terrain(answers, terrain if answers.sun else None)
         code = enrich_folder(out, None, answers, jobs) or code
     return code
-
-
-def start_log(log_file: Path | None, given: list[Any]) -> None:
-    """Start the log; raises OutputError where its file is one of those `given`, or a run's."""
-    if log_file is not None:
-        from ..write.files import refuse_overwriting, refuse_run_file
-
-        refuse_overwriting([log_file], given)
-        refuse_run_file(log_file)
-    start(console_level(), log_file)
 
 
 def refuse_lone_options(epoch: list[str] | None, enrich: bool, changes: Changes) -> None:

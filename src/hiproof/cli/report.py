@@ -6,7 +6,6 @@ from pathlib import Path
 
 import click
 
-from ..errors import OutputError
 from ..log import count_things
 from ..progress import show_progress
 
@@ -30,23 +29,18 @@ def report(
         from ..evaluate.run import evaluate_run, list_run_inputs
         from ..read.models.damage import SkippedBuildings
         from ..update.before_after import draw_changes, evaluate_earlier
-        from ..write.files import elsewhere, refuse_overwriting, refuse_run_file
+        from ..write.files import refuse_replacing, suggest_elsewhere
 
         path, left_out = out or Path(folder) / "report.html", SkippedBuildings()
-        refuse_overwriting([path], [*(clouds or ()), footprints, *list_run_inputs(folder)])
-        refuse_run_file(path)
+        refuse_replacing([path], [*(clouds or ()), footprints, *list_run_inputs(folder)])
         run = evaluate_run(
             folder, clouds or (), footprints, layer=layer, damaged=left_out, must_be_valid=True
         )
         left_out.refuse_all(model.is_damaged for model in run.models)
-        try:
+        with suggest_elsewhere(f"hiproof report {folder} --out FILE", out):
             changes = draw_changes(run, evaluate_earlier(run.record, left_out))
             title = f"hiproof: {Path(folder).resolve().name}"
             write_report(path, run, title=title, changes=changes)
-        except OutputError as error:
-            raise (
-                elsewhere(error, f"hiproof report {folder} --out FILE") if out is None else error
-            ) from error
     size = f"{path.stat().st_size / 1e6:.1f} MB"
     click.echo(f"{path}: {count_things(len(run.models), 'building')}, {size}{left_out.describe()}")
     return left_out.exit_code

@@ -28,11 +28,10 @@ def segment(
     with show_progress("label"):
         from ..segment.files import segment_files
         from ..settings import Settings
-        from ..write.files import refuse_overwriting, refuse_run_file
+        from ..write.files import refuse_replacing
 
         table = out.with_suffix(".csv")
-        refuse_overwriting([out, table], [*clouds, weights])
-        refuse_run_file(table)
+        refuse_replacing([out, table], [*clouds, weights])
         read = {name: value for name, value in (("crs", crs), ("unit", unit)) if value is not None}
         segment = {"weights": weights, "device": device}
         settings = Settings().replace({"read": read, "segment": segment})

@@ -47,12 +47,13 @@ def read_state(ledger: Ledger) -> dict[str, Any]:
     """Return the progress of a run for `--json`: tasks, buildings, rate, summary, failures."""
     tasks = ledger.tasks()
     sort, solve = ([task for task in tasks if task.kind == kind] for kind in ("sort", "solve"))
-    finished, total = count_buildings(solve), sum(task.buildings for task in solve)
-    rate = measure_rate(solve)
+    closed = [task for task in solve if task.state in CLOSED]
+    finished, total = (sum(task.buildings for task in of) for of in (closed, solve))
+    rate = measure_rate(closed)
     return {
         "finished": ledger.get("merged") == "yes",
-        "point_files": {"read": count_closed(sort), "total": len(sort)},
-        "work_tiles": {"solved": count_closed(solve), "total": len(solve)},
+        "point_files": {"read": sum(t.state in CLOSED for t in sort), "total": len(sort)},
+        "work_tiles": {"solved": len(closed), "total": len(solve)},
         "buildings": {"done": finished, "total": total},
         "buildings_per_second": rate,
         "seconds_left": (total - finished) / rate if rate and finished < total else None,
@@ -64,30 +65,19 @@ def read_state(ledger: Ledger) -> dict[str, Any]:
     }
 
 
-def count_closed(tasks: list[Task]) -> int:
-    return sum(task.state in CLOSED for task in tasks)
-
-
-def count_buildings(tasks: list[Task]) -> int:
-    """Count the buildings of the tasks that are done."""
-    return sum(task.buildings for task in tasks if task.state in CLOSED)
-
-
-def measure_rate(tasks: list[Task]) -> float | None:
+def measure_rate(closed: list[Task]) -> float | None:
     """Return buildings a second between the first and the last task done, None below two."""
-    by_time = sorted((t.finished or 0.0, t.buildings) for t in tasks if t.state in CLOSED)
-    if len(by_time) < 2 or (seconds := by_time[-1][0] - by_time[0][0]) <= 0:
-        return None
-    return (count_buildings(tasks) - by_time[0][1]) / seconds
+    by_time = sorted((t.finished or 0.0, t.buildings) for t in closed)
+    seconds = by_time[-1][0] - by_time[0][0] if by_time else 0.0
+    return sum(buildings for _, buildings in by_time[1:]) / seconds if seconds > 0 else None
 
 
 def describe(ledger: Ledger, state: dict[str, Any], folder: str) -> list[str]:
     """Return progress, summary and failures, a line each."""
-    files, tiles, buildings = (state[name] for name in ("point_files", "work_tiles", "buildings"))
     lines = [
-        f"point files read: {files['read']} of {files['total']}",
-        f"work tiles solved: {tiles['solved']} of {tiles['total']}",
-        f"buildings done: {buildings['done']} of {buildings['total']}",
+        "point files read: {read} of {total}".format(**state["point_files"]),
+        "work tiles solved: {solved} of {total}".format(**state["work_tiles"]),
+        "buildings done: {done} of {total}".format(**state["buildings"]),
     ]
     if rate := state["buildings_per_second"]:
         left = state["seconds_left"]

@@ -76,16 +76,14 @@ def print_update(summary: UpdateSummary) -> None:
     counts = ", ".join(f"{n:,} {name}" for name, n in summary.by_change.items())
     buildings = count_things(summary.run.buildings, "building")
     click.echo(click.style(f"{buildings}: {counts}", bold=True))
-    if summary.by_kind:
-        click.echo(
-            "largest change of each: "
-            + ", ".join(f"{name} {n:,}" for name, n in summary.by_kind.items())
-        )
-    if summary.outside:
-        click.echo(
-            "roofs outside all outlines: "
-            + ", ".join(f"{name} {n:,}" for name, n in summary.outside.items())
-        )
+    others = {
+        "largest change of each": summary.by_kind,
+        "roofs outside all outlines": summary.outside,
+    }
+    for subject, numbers in others.items():
+        if numbers:
+            counts = ", ".join(f"{name} {n:,}" for name, n in numbers.items())
+            click.echo(f"{subject}: {counts}")
     surveys, shift = summary.surveys, summary.surveys.shift
     lies = ", ".join(
         f"{value:+.2f} ± {sigma:.2f}" for value, sigma in zip(shift.xyz, shift.sigma, strict=True)

@@ -17,7 +17,7 @@ import re
 import secrets
 import shutil
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -59,9 +59,15 @@ def output_error(path: str | os.PathLike, error: OSError) -> OutputError:
     return OutputError(f"expected to write {os.fspath(path)}, but {advice}")
 
 
-def elsewhere(error: OutputError, command: str) -> OutputError:
-    """Add the `command` that writes elsewhere to an error on a place nobody chose."""
-    return OutputError(f"{error}. Write elsewhere with `{command}`")
+@contextmanager
+def suggest_elsewhere(command: str, chosen: Path | None) -> Iterator[None]:
+    """Add the `command` that writes elsewhere to an error, unless its place was `chosen`."""
+    try:
+        yield
+    except OutputError as error:
+        if chosen is not None:
+            raise
+        raise OutputError(f"{error}. Write elsewhere with `{command}`") from error
 
 
 class OutputFile(io.FileIO):
@@ -264,15 +270,17 @@ def refuse_overwriting(outputs: Iterable[Path], inputs: Iterable[Any]) -> None:
             )
 
 
-def refuse_run_file(out: Path) -> None:
-    """Raise OutputError where a file to write is a run's own."""
-    path = Path(os.path.realpath(out))
-    is_own = path.name in OWN_FILES and (path.with_name(RUN_RECORD)).exists()
-    if path.is_file() and (is_own or path.name == PARAMETERS):
-        raise OutputError(
-            f"expected a new file to write, got {out}, which is a file of a run; choose another "
-            "name"
-        )
+def refuse_replacing(outputs: Sequence[Path], inputs: Iterable[Any]) -> None:
+    """Raise OutputError where an output is a run's own file, too; see `refuse_overwriting`."""
+    refuse_overwriting(outputs, inputs)
+    for out in outputs:
+        path = Path(os.path.realpath(out))
+        is_own = path.name in OWN_FILES and path.with_name(RUN_RECORD).exists()
+        if path.is_file() and (is_own or path.name == PARAMETERS):
+            raise OutputError(
+                f"expected a new file to write, got {out}, which is a file of a run; choose "
+                "another name"
+            )
 
 
 def is_file(path: str) -> bool:
