@@ -113,12 +113,9 @@ def rows(path: FilePath, required: tuple[str, ...]) -> Iterator[tuple[int, dict[
     try:
         with open(path, newline="", encoding="utf-8-sig") as file:
             reader = csv.DictReader(file)
-            missing = [name for name in required if name not in (reader.fieldnames or [])]
-            if missing:
-                got = (
-                    ", ".join(name[:30] for name in (reader.fieldnames or [])[:8])
-                    or "an empty file"
-                )
+            names = reader.fieldnames or []
+            if not set(required) <= set(names):
+                got = ", ".join(name[:30] for name in names[:8]) or "an empty file"
                 raise InputError(
                     f"expected RoofN3D's columns {', '.join(required)} in {path}, got {got}; "
                     "name roofn3d_buildings.csv or roofn3d_surfacegrowing.csv as downloaded"
@@ -155,11 +152,10 @@ def coordinates(wkt: str) -> np.ndarray:
 
 def polygon(wkt: str) -> shapely.Polygon:
     """Return the largest polygon of a WKT field, empty for an empty field."""
-    if not wkt.strip():
-        return shapely.Polygon()
     from .outlines.polygons import simple_polygons
 
-    return max(simple_polygons(shapely.from_wkt(wkt)), key=lambda part: part.area)
+    parts = simple_polygons(shapely.from_wkt(wkt.strip() or "POLYGON EMPTY"))
+    return max(parts, key=lambda part: part.area)
 
 
 def point_keys(points: np.ndarray) -> np.ndarray:

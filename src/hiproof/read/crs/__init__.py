@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import re
 import warnings
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -98,14 +99,12 @@ def refuse_other_crs(first: str | None, name: str | None, place: str) -> None:
     """Raise InputError where a `place` in a file names another CRS than its beginning."""
     if name is None or name == first:
         return
-    try:
+    with suppress(InputError):
         if first is not None and parse_crs(first) == parse_crs(name):
             return
-    except InputError:
-        pass
     raise InputError(
-        f"expected one CRS in a file, got {name:.80} in {place} after "
-        f"{'none' if first is None else first[:80]}; write a file for each"
+        f"expected one CRS in a file, got {name:.80} in {place} after {first or 'none':.80}; write "
+        "a file for each"
     )
 
 
@@ -170,11 +169,10 @@ def same_horizontal(first: CRS | None, second: CRS | None) -> bool:
     """
     if first is None or second is None:
         return False
-    first, second = horizontal_crs(first), horizontal_crs(second)
-    if first.equals(second, ignore_axis_order=True):
-        return True
-    code = epsg_code(first)
-    return code is not None and code == epsg_code(second)
+    plan, other = horizontal_crs(first), horizontal_crs(second)
+    return plan.equals(other, ignore_axis_order=True) or (
+        epsg_code(plan) == epsg_code(other) is not None
+    )
 
 
 @functools.lru_cache(maxsize=64)
@@ -218,8 +216,12 @@ def find_units(crs: CRS | None, source: str = "the point clouds", unit_name: str
             "to the UTM zone or the national grid of the place (`pdal translate`, `ogr2ogr`)"
         )
     check_plan_axes(plan, source)
-    across = plan.axis_info[0]
-    vertical = height_axis(crs) or across
+    across = vertical = plan.axis_info[0]
+    heights = vertical_crs(crs)
+    if heights is not None:
+        vertical = heights.axis_info[0]
+    elif len(crs.axis_info) == 3 and not crs.is_compound:
+        vertical = crs.axis_info[2]
     check_height_axis(vertical, crs, source)
     units = Units(
         across.unit_conversion_factor,
@@ -227,7 +229,7 @@ def find_units(crs: CRS | None, source: str = "the point clouds", unit_name: str
         across.unit_name,
         vertical.unit_name,
     )
-    if unit_name != "auto" and abs(NAMED_UNITS[unit_name].plan / units.plan - 1) > 1e-9:
+    if unit_name != "auto" and differ(NAMED_UNITS[unit_name].plan, units.plan):
         raise InputError(
             f"expected {source} in {unit_name}, as --unit says, got {crs.name} in {units}; leave "
             "--unit out, or say with --crs which CRS is right"
@@ -235,19 +237,16 @@ def find_units(crs: CRS | None, source: str = "the point clouds", unit_name: str
     return units
 
 
-def height_axis(crs: CRS) -> Any:
-    """Return pyproj's axis of the heights of `crs`, None if it has no heights."""
-    height = vertical_crs(crs)
-    if height is not None:
-        return height.axis_info[0]
-    return crs.axis_info[2] if len(crs.axis_info) == 3 and not crs.is_compound else None
+def differ(unit: float, other: float) -> bool:
+    """Return whether two units of so many metres are not one."""
+    return abs(unit / other - 1) > 1e-9
 
 
 def find_height_units(heights: CRS, source: str, unit_name: str) -> Units:
     """Return units of a CRS that names heights alone; the plan's has to be the same."""
     units, vertical = NAMED_UNITS[unit_name], heights.axis_info[0]
     check_height_axis(vertical, heights, source)
-    if abs(vertical.unit_conversion_factor / units.plan - 1) > 1e-9:
+    if differ(vertical.unit_conversion_factor, units.plan):
         raise InputError(
             f"expected {source} in a CRS of the plan, got {heights.name}, which names heights "
             f"alone, in {vertical.unit_name}; name both with --crs, such as EPSG:28992+5709"
@@ -273,13 +272,11 @@ def same_heights(first: CRS, second: CRS) -> bool:
     ...     CRS("EPSG:2263+5703"))
     (True, False)
     """
-    if abs(find_units(first).height / find_units(second).height - 1) > 1e-9:
+    if differ(find_units(first).height, find_units(second).height):
         return False
-    codes = [
-        None if height is None else epsg_code(height)
-        for height in (vertical_crs(first), vertical_crs(second))
-    ]
-    return None in codes or codes[0] == codes[1]
+    heights = vertical_crs(first), vertical_crs(second)
+    codes = {epsg_code(height) for height in heights if height is not None}
+    return len(codes - {None}) < 2
 
 
 def describe_crs(crs: CRS | None) -> str:
@@ -315,24 +312,19 @@ def convert_to_degrees(crs: CRS, xy: np.ndarray) -> np.ndarray:
     up to a kilometre from WGS 84: to look for the operation between the two takes 50 ms.
     """
     plan = horizontal_crs(crs)
-    if not names_place(crs):
-        return np.full(xy.shape, np.nan)
-    try:
+    with suppress(InputError, ProjError):
         if plan.is_projected:
             return np.column_stack(Proj(plan)(xy[:, 0], xy[:, 1], inverse=True))
-        return np.column_stack(make_transformer(plan, WGS84).transform(*xy.T))
-    except (InputError, ProjError):
-        return np.full(xy.shape, np.nan)
+        if names_place(crs):
+            return np.column_stack(make_transformer(plan, WGS84).transform(*xy.T))
+    return np.full(xy.shape, np.nan)
 
 
 def find_best_transformer(crs: Any, target: Any, **options: Any) -> Any:
     """Return pyproj's best transformer to `target` that works here, None without one."""
     from pyproj.transformer import TransformerGroup
 
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), suppress(ProjError, IndexError):
         warnings.simplefilter("ignore", UserWarning)  # of better ones whose grids are missing
-        try:
-            group = TransformerGroup(crs, target, always_xy=True, **options)
-        except ProjError:
-            return None
-    return group.transformers[0] if group.transformers else None
+        return TransformerGroup(crs, target, always_xy=True, **options).transformers[0]
+    return None

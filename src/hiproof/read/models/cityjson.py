@@ -54,15 +54,12 @@ def read_shell(shell: Any, values: Any, surfaces: Any, count: int) -> list[Shell
         for face in require_list(shell, "a shell")
     ]
     numbers = require_list([] if values is None else values, "semantic values")
-    surface_semantics = require_list(surfaces, "semantic surfaces")
-    semantics_list = (
-        {} if number is None else surface_at(number, surface_semantics)
-        for number in chain(numbers, repeat(None))
-    )
-    return [
-        ShellSurface(rings, KINDS[semantics.get("type", WALL)], semantics)
-        for rings, semantics in zip(faces, semantics_list)  # noqa: B905
-    ]
+    require_list(surfaces, "semantic surfaces")
+    result = []
+    for rings, number in zip(faces, chain(numbers, repeat(None)), strict=False):
+        semantics = {} if number is None else surface_at(number, surfaces)
+        result.append(ShellSurface(rings, KINDS[semantics.get("type", WALL)], semantics))
+    return result
 
 
 def read_ring(ring: Any, count: int) -> list[int]:
@@ -202,11 +199,9 @@ def world_vertices(
 
 def unusable(id: str, feature: Feature, error: Exception) -> InputError:
     """Say in a sentence why the city object `id` of a feature cannot be used."""
-    place = (
-        feature.place
-        if f"building {id:.80} in " in feature.place
-        else f"{id:.80} in {feature.place}"
-    )
+    place = feature.place
+    if f"building {id:.80} in " not in place:
+        place = f"{id:.80} in {place}"
     return InputError(
         f"expected {place} to be one that can be used, got {explain_error(error)}; mend it there, "
         "or make the file anew with `hiproof build`"
@@ -310,4 +305,4 @@ def reference_system(document: dict[str, Any]) -> str | None:
     """Return the CRS that a document's metadata name."""
     metadata = document.get("metadata")
     name = metadata.get("referenceSystem") if isinstance(metadata, dict) else None
-    return name if isinstance(name, str) and name else None
+    return (name or None) if isinstance(name, str) else None

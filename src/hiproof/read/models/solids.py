@@ -53,25 +53,24 @@ def read_solids(path: FilePath, damaged: Damaged = refuse) -> Iterator[tuple[str
     InputError when the file cannot be read as what its name says.
     """
     path = Path(path)
-    suffix = path.suffix.lower()
     readers = {
-        ".json": cityjson_solids,
-        ".jsonl": cityjson_solids,
+        **dict.fromkeys((".json", ".jsonl"), cityjson_solids),
         **dict.fromkeys(CITYGML_SUFFIXES, citygml_solids),
     }
+    read = readers.get(path.suffix.lower())
     if path.is_dir():
         raise InputError(
             f"expected a file of solids, got the folder {path}; name one in it, such as "
             "buildings.city.jsonl"
         )
-    if suffix not in readers:
+    if read is None:
         raise InputError(
             f"expected a CityJSON (.json), CityJSONSeq (.jsonl) or CityGML (.gml) file, got {path};"
             " rename it if it is one of these"
         )
     if not path.is_file():
         raise InputError(f"expected a file at {path}, got none; check the name")
-    yield from readers[suffix](path, damaged)
+    yield from read(path, damaged)
 
 
 def read_building_solids(path: Path, damaged: Damaged, units: Units) -> Iterator[tuple[str, Solid]]:

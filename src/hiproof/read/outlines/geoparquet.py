@@ -275,7 +275,9 @@ def rows_meeting(table: Any, column: GeometryColumn, extent: shapely.Geometry | 
     if extent is None:
         return np.arange(len(table))
     if column.sides:
-        boxes = np.column_stack([numbers_at(table, way) for way in column.sides])
+        sides = table.select(sorted(column.boxes)).flatten()
+        numbers = [sides.column(".".join(way)).cast("float64") for way in column.sides]
+        boxes = np.column_stack([np.array(values.to_numpy(), float) for values in numbers])
     else:
         boxes = shapely.bounds(geometries_in(table, column))
     known = np.flatnonzero(np.isfinite(boxes).all(axis=1))
@@ -283,24 +285,12 @@ def rows_meeting(table: Any, column: GeometryColumn, extent: shapely.Geometry | 
     return known[shapely.intersects(extent, shapely.box(*boxes[known].T))]
 
 
-def numbers_at(table: Any, way: Sequence[str]) -> np.ndarray:
-    """Return the numbers (n,) of the column at the names of `way`, NaN without."""
-    import pyarrow.compute
-
-    values = table.column(way[0])
-    if len(way) > 1:
-        values = pyarrow.compute.struct_field(values, list(way[1:]))
-    return np.array(values.cast("float64").to_numpy(), float)
-
-
 def geometries_in(table: Any, column: GeometryColumn) -> np.ndarray:
     """Return the geometries (n,) of a table, None where a row has none."""
     values = table.column(column.name)
     if column.encoding not in LISTS:
-        bodies = np.empty(len(table), object)
-        bodies[:] = values.to_pylist()
-        return decode_geometries(bodies)
-    geometries = np.empty(len(table), object)
+        return decode_geometries(values.to_pylist())
+    geometries = np.full(len(table), None)
     known = values.drop_null().combine_chunks()
     geometries[values.is_valid().to_numpy()] = convert_surfaces(known, LISTS[column.encoding])
     return geometries

@@ -156,25 +156,21 @@ class RasterTerrain:
         heights = np.full(len(row), np.nan)
         # Bilinear interpolation runs between pixel centres; the outermost half pixel takes its
         # centre's value.
-        column = np.clip(column[inside] - 0.5, 0, self.dataset.width - 1)
-        row = np.clip(row[inside] - 0.5, 0, self.dataset.height - 1)
-        heights[inside] = bilinear(self.take, row, column)
+        places = np.column_stack([row, column])[inside] - 0.5
+        last = np.array(self.dataset.shape) - 1
+        heights[inside] = bilinear(self.take, *np.clip(places, 0, last).T)
         return heights
 
     def is_coded_at(self, xy_world: np.ndarray) -> np.ndarray:
         """Return whether (n,) pixels at `xy_world` (n, 2) hold a code, that is, no height."""
         row, column, inside = self.pixels_at(xy_world)
         coded = np.zeros(len(row), bool)
-        column = np.floor(column[inside]).astype(int)
-        row = np.floor(row[inside]).astype(int)
-        coded[inside] = np.isinf(self.take(row, column))
+        coded[inside] = np.isinf(self.take(row[inside].astype(int), column[inside].astype(int)))
         return coded
 
     def take(self, row: np.ndarray, column: np.ndarray) -> np.ndarray:
         """Return heights (n,) of pixels within the raster, NaN or infinite as `read_tile`."""
-        row = np.minimum(row, self.dataset.height - 1)
-        column = np.minimum(column, self.dataset.width - 1)
-        places = np.column_stack([row, column])
+        places = np.minimum(np.column_stack([row, column]), np.array(self.dataset.shape) - 1)
         tiles, index = number_cells(places // TILE_PX)
         result = np.empty(len(row))
         for k, tile in enumerate(tiles.tolist()):
@@ -184,20 +180,13 @@ class RasterTerrain:
 
     def pixels_at(self, xy_world: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return rows and columns (n,) at `xy_world` (n, 2), and which lie inside."""
-        xy = self.units.from_metres(np.asarray(xy_world, float)[:, :2])
+        x, y = self.units.from_metres(np.asarray(xy_world, float)[:, :2]).T
         if self.transformer is not None:
-            xy = np.column_stack(self.transformer.transform(xy[:, 0], xy[:, 1]))
-        to_pixel = ~self.dataset.transform
-        column = to_pixel.a * xy[:, 0] + to_pixel.b * xy[:, 1] + to_pixel.c
-        row = to_pixel.d * xy[:, 0] + to_pixel.e * xy[:, 1] + to_pixel.f
-        return (
-            row,
-            column,
-            (column >= 0)
-            & (row >= 0)
-            & (column <= self.dataset.width)
-            & (row <= self.dataset.height),
-        )
+            x, y = self.transformer.transform(x, y)
+        a, b, c, d, e, f, *_ = ~self.dataset.transform
+        column, row = a * x + b * y + c, d * x + e * y + f
+        height, width = self.dataset.shape
+        return row, column, (column >= 0) & (row >= 0) & (column <= width) & (row <= height)
 
     def knows_any(self, xy_world: np.ndarray) -> bool:
         """Return whether any of `xy_world` (n, 2), sampled, has a height; or DamagedRaster."""
@@ -221,15 +210,12 @@ class RasterTerrain:
         from rasterio.errors import RasterioError
         from rasterio.windows import Window
 
-        height = min(TILE_PX, self.dataset.height - row * TILE_PX)
-        width = min(TILE_PX, self.dataset.width - column * TILE_PX)
-        window = Window(column * TILE_PX, row * TILE_PX, width, height)
+        y, x = row * TILE_PX, column * TILE_PX
+        height, width = self.dataset.shape
+        window = Window(x, y, min(TILE_PX, width - x), min(TILE_PX, height - y))
         try:
-            stored = (
-                self.dataset.read(self.band, window=window, masked=True)
-                .astype(float)
-                .filled(np.nan)
-            )
+            pixels = self.dataset.read(self.band, window=window, masked=True)
+            stored = pixels.astype(float).filled(np.nan)
             if self.alpha is not None:
                 stored[self.dataset.read(self.alpha, window=window) == 0] = np.nan
         except (RasterioError, OSError) as error:
@@ -246,10 +232,8 @@ class RasterTerrain:
     def codes(self) -> tuple[float, ...]:
         """Those of CODES that lie far from all other pixels of some tiles, so are no heights."""
         along = [
-            np.unique(
-                np.linspace(0, (size - 1) // TILE_PX, SAMPLED_TILES).round().astype(int)
-            ).tolist()
-            for size in (self.dataset.height, self.dataset.width)
+            set(np.linspace(0, (size - 1) // TILE_PX, SAMPLED_TILES).round().astype(int).tolist())
+            for size in self.dataset.shape
         ]
         pairs = [self.stored_and_heights(*tile) for tile in product(*along)]
         stored = np.concatenate([stored[np.isfinite(heights)] for stored, heights in pairs])
@@ -270,13 +254,10 @@ def bilinear(
     take: Callable[[np.ndarray, np.ndarray], np.ndarray], row: np.ndarray, column: np.ndarray
 ) -> np.ndarray:
     """Return the weighted mean (n,) of four pixels by `take`, of finite ones, or NaN."""
-    row0, column0 = np.floor(row).astype(int), np.floor(column).astype(int)
+    row0, column0 = row.astype(int), column.astype(int)
     down, right = row - row0, column - column0
-    corners = ((0, 0), (0, 1), (1, 0), (1, 1))
-    values = np.stack([take(row0 + i, column0 + j) for i, j in corners])
-    weights = np.stack(
-        [(1 - down) * (1 - right), (1 - down) * right, down * (1 - right), down * right]
-    )
+    values = np.stack([take(row0 + i, column0 + j) for i in (0, 1) for j in (0, 1)])
+    weights = np.stack([y * x for y in (1 - down, down) for x in (1 - right, right)])
     mask = np.isfinite(values)
     weights, values = np.where(mask, weights, 0.0), np.where(mask, values, 0.0)
     total = weights.sum(axis=0)
