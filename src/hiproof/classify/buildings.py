@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import scipy
 
-from ..errors import InputError
+from ..errors import ErrorReport, InputError, report_error
 from ..frames import Box
 from ..geometry.point_grid import PointGrid
 from ..log import count_things
@@ -41,19 +41,12 @@ SQUARE = np.ones((3, 3))  # a cell and the eight around it
 REACH_M = 1.0  # and nothing farther from them is part of it
 
 
-def raise_error(inside: np.ndarray, error: Exception) -> None:
-    raise error
-
-
-def classify(
-    xyz: np.ndarray, on_error: Callable[[np.ndarray, Exception], None] = raise_error
-) -> np.ndarray:
+def classify(xyz: np.ndarray) -> np.ndarray:
     """Return the class (n,) uint8 of each point (n, 3) in world metres.
 
-    Classes are BUILDING, GROUND and UNKNOWN. `on_error` is called with the indices of the points of
-    a square that fails; they stay UNKNOWN.
+    Classes are BUILDING, GROUND and UNKNOWN.
     """
-    search = SquareSearch(xyz, on_error)
+    search = SquareSearch(xyz)
     search.classify(search.squares)
     return search.classes
 
@@ -68,11 +61,8 @@ class SquareSearch:
     else the cloud holds. `classes` (n,) are UNKNOWN in squares that were not searched.
     """
 
-    def __init__(
-        self, xyz: np.ndarray, on_error: Callable[[np.ndarray, Exception], None] = raise_error
-    ):
-        self.xyz, self.on_error = xyz, on_error
-        self.classes = np.full(len(xyz), UNKNOWN, np.uint8)
+    def __init__(self, xyz: np.ndarray):
+        self.xyz, self.classes = xyz, np.full(len(xyz), UNKNOWN, np.uint8)
         self.squares, self.searched = find_squares(xyz), set[Square]()
         if len(xyz):
             density = plan_density(xyz)
@@ -98,7 +88,11 @@ class SquareSearch:
         try:
             self.classes[nearby[mask]] = classify_points(self.xyz[nearby], self.cell_m)[mask]
         except Exception as error:
-            self.on_error(nearby[mask], error)
+            self.skip(nearby[mask], error)
+
+    def skip(self, inside: np.ndarray, error: Exception) -> None:
+        """Leave the points `inside` (indices) UNKNOWN, whose square fails: here it may not."""
+        raise error
 
 
 def find_squares(xyz: np.ndarray, reach_m: float = 0.0) -> set[Square]:
@@ -121,11 +115,9 @@ def classify_points(xyz: np.ndarray, cell_m: float) -> np.ndarray:
     rise = 0.5 * ground.cell_m * ground.slope_at(xyz)
     # the ground's cells lie as low as their lowest point
     height = xyz[:, 2] - ground.height_at(xyz) - rise
-    classes = np.where(np.abs(height) <= GROUND_HEIGHT_M + rise, GROUND_CLASS, UNKNOWN).astype(
-        np.uint8
-    )
-    classes[building_points(xyz, height, cell_m)] = BUILDING
-    return classes
+    is_ground = np.abs(height) <= GROUND_HEIGHT_M + rise
+    is_building = building_points(xyz, height, cell_m)
+    return np.select([is_building, is_ground], [BUILDING, GROUND_CLASS], UNKNOWN).astype(np.uint8)
 
 
 def roof_points(xyz: np.ndarray, more_odds: float = 0.0) -> np.ndarray:
@@ -136,27 +128,26 @@ def roof_points(xyz: np.ndarray, more_odds: float = 0.0) -> np.ndarray:
     """
     if len(xyz) < 4:
         return np.ones(len(xyz), bool)
-    surfaces = find_surfaces(xyz)
-    return smooth_odds(surfaces, log_odds(surfaces) + more_odds)[surfaces.voxel] > 0
+    return smooth_odds(find_surfaces(xyz), more_odds) > 0
 
 
-def log_odds(surfaces: Surfaces) -> np.ndarray:
-    """Return each voxel's log odds (v,) of belonging to a roof or wall, by its surface alone."""
+def smooth_odds(surfaces: Surfaces, more_odds: float | np.ndarray) -> np.ndarray:
+    """Return each point's log odds (n,) of belonging to a roof or wall.
+
+    They are those of its voxel by its surface, with `more_odds` (v,), none surer than 6, and those
+    of neighbours taken together.
+    """
     extent = np.log(surfaces.extent_m2)
-    return (
+    odds = (
         LOG_ROUGHNESS * np.log(surfaces.roughness_m + 0.02)
         + LOG_LARGEST * extent[surfaces.neighbours].max(axis=1)
         + LOG_EXTENT * surfaces.around(extent)
         + CONSTANT
     )
-
-
-def smooth_odds(surfaces: Surfaces, odds: np.ndarray) -> np.ndarray:
-    """Log odds (v,), those of neighbours taken together; none is surer than 6."""
-    odds = np.clip(odds, -6.0, 6.0)
+    odds = np.clip(odds + more_odds, -6.0, 6.0)
     for _ in range(SMOOTHING_ROUNDS):
         odds = surfaces.around(odds)
-    return odds
+    return odds[surfaces.voxel]
 
 
 def building_points(xyz: np.ndarray, height: np.ndarray, cell_m: float) -> np.ndarray:
@@ -166,19 +157,15 @@ def building_points(xyz: np.ndarray, height: np.ndarray, cell_m: float) -> np.nd
     if mask.sum() < 4:
         return is_large
     surfaces = find_surfaces(xyz[mask])
-    in_the_open = cells.compute_local_share(height < OPEN_M, NEIGHBOURHOOD_M)[
-        cells.of(surfaces.xyz)
-    ]
-    odds[mask] = smooth_odds(surfaces, log_odds(surfaces) + GROUND_SHARE * in_the_open)[
-        surfaces.voxel
-    ]
+    open_share = cells.compute_local_share(height < OPEN_M, NEIGHBOURHOOD_M)
+    more_odds = GROUND_SHARE * open_share[cells.of(surfaces.xyz)]
+    odds[mask] = smooth_odds(surfaces, more_odds)
     is_large[mask] = surfaces.extent_m2[surfaces.voxel] >= CORE_M2
     plan = building_cells(
         cells.count(odds > 0), cells.count(mask), cells.count(is_large & (odds > 0)) > 0, cell_m
     )
-    inside, nearby = (
-        where.ravel()[cells.index] for where in (plan, scipy.ndimage.binary_dilation(plan, SQUARE))
-    )
+    inside = plan.ravel()[cells.index]
+    nearby = scipy.ndimage.binary_dilation(plan, SQUARE).ravel()[cells.index]
     below_roof = (height < cells.highest(height, odds > 0).ravel()[cells.index]) & (odds > UNLIKELY)
     return (inside & ~mask & (height > WALL_FOOT_M)) | (nearby & mask & ((odds > 0) | below_roof))
 
@@ -199,11 +186,8 @@ def building_cells(
     area = scipy.ndimage.sum_labels(core, label, np.arange(count + 1)) * cell_m**2
     core = core & (area >= FEWEST_M2)[label]
     reach = round(REACH_M / cell_m)
-    plan = core | (
-        likely & scipy.ndimage.binary_dilation(core, SQUARE, iterations=reach)
-        if reach
-        else likely & core
-    )
+    near = scipy.ndimage.binary_dilation(core, SQUARE, iterations=reach) if reach else core
+    plan = core | (likely & near)
     gaps = (
         scipy.ndimage.binary_fill_holes(plan)
         & (upper > 0)
@@ -220,33 +204,26 @@ def close_gaps(cells: np.ndarray) -> np.ndarray:
 NO_ROOFS = {3: "low vegetation", 7: "noise", 9: "water", 17: "bridges", 18: "noise"}  # by class
 
 
-class RoofSearch:
-    """The search for roofs by squares; `on_error` gets the points of a square that fails."""
+class RoofSearch(SquareSearch):
+    """The search for roofs by squares; `failed` has points and error of squares that failed."""
 
-    def __init__(
-        self,
-        cloud: PointCloud,
-        ground_classes: tuple[int, ...],
-        on_error: Callable[[np.ndarray, Exception], None],
-    ):
-        self.cloud, self.on_error, self.n_failed = cloud, on_error, 0
+    def __init__(self, cloud: PointCloud, ground_classes: tuple[int, ...]):
+        self.cloud = cloud
+        self.failed: list[tuple[np.ndarray, ErrorReport]] = []
         self.indices = np.flatnonzero(~np.isin(cloud.classes, tuple(NO_ROOFS)))
         self.may_be_roof = ~np.isin(cloud.classes[self.indices], ground_classes)
-        self.search = SquareSearch(cloud.xyz[self.indices], self.skip_square)
+        super().__init__(cloud.xyz[self.indices])
 
-    def skip_square(self, inside: np.ndarray, error: Exception) -> None:
-        self.n_failed += 1
-        self.on_error(self.indices[inside], error)
+    def skip(self, inside: np.ndarray, error: Exception) -> None:
+        self.failed.append((self.indices[inside], report_error(error)))
 
     def find(
-        self,
-        squares: set[Square] | None = None,
-        progress: Callable[[int, int], None] = lambda *_: None,
+        self, progress: Callable[[int, int], None], squares: set[Square] | None = None
     ) -> np.ndarray:
         """Return ascending indices of points of roofs in `squares`, or in all: else InputError."""
-        self.search.classify(self.search.squares if squares is None else squares, progress)
-        roofs = self.indices[(self.search.classes == BUILDING) & self.may_be_roof]
-        if self.n_failed or squares is not None:
+        self.classify(self.squares if squares is None else squares, progress)
+        roofs = self.indices[(self.classes == BUILDING) & self.may_be_roof]
+        if self.failed or squares is not None:
             return roofs
         return require_roofs(
             roofs, self.cloud, "none of which lies on a smooth surface above the ground"

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -51,8 +51,7 @@ DIRECTION_DEG, APART_DEG, MOST_DIRECTIONS, LEAST_SUPPORT = 3.0, 8.0, 6, 0.05
 STRAIGHT_M = 0.7  # corners of the block's border that are none
 
 
-@dataclass(frozen=True)
-class Bonds:
+class Bonds(NamedTuple):
     """Pairs of neighbouring points (b, 2), by their numbers.
 
     `ends` (b, 2, 2) are their places in plan and `middle` (b, 2) lies between these. `state` (b,)
@@ -68,7 +67,7 @@ class Bonds:
     def among(self, selection: np.ndarray) -> Bonds:
         """Select bonds by `selection` (b,)."""
         number = np.flatnonzero(selection)
-        return Bonds(*(getattr(self, f.name).take(number, axis=0) for f in fields(self)))
+        return Bonds(*(values[number] for values in self))
 
     def inside(self, area: shapely.Geometry) -> Bonds:
         return self.among(shapely.intersects_xy(area, self.middle))
@@ -156,11 +155,9 @@ def separate_houses(
         )
         for house in houses_in(shapely.buffer(block, gap_m, join_style="mitre"), roofs, bonds)
     ]
-    return (
-        [area]
-        if len(houses) == 1
-        else [shapely.transform(house, lambda xy: xy + origin[:2]) for house in houses]
-    )
+    if len(houses) == 1:
+        return [area]
+    return [shapely.transform(house, lambda xy: xy + origin[:2]) for house in houses]
 
 
 def without_necks(area: shapely.Geometry, gap_m: float, roofs: Roofs) -> list[shapely.Geometry]:
@@ -229,16 +226,11 @@ def find_bonds(surfaces: Surfaces) -> Bonds:
     xyz, normal, smooth = (
         values[mask] for values in (surfaces.xyz, surfaces.normal, surfaces.is_smooth)
     )
-    if len(xyz) < 2:
-        return Bonds(
-            np.empty((0, 2), np.int64),
-            np.empty((0, 2, 2)),
-            np.empty((0, 2)),
-            *np.empty((2, 0), np.int64),
-        )
-    tree = cKDTree(xyz[:, :2])
-    spacing = np.median(tree.query(xyz[:, :2], k=2)[0][:, 1])
-    points = tree.query_pairs(max(BOND_REACH_M, REACH_SPACINGS * spacing), output_type="ndarray")
+    points = np.empty((0, 2), np.int64)
+    if len(xyz) > 1:
+        tree = cKDTree(xyz[:, :2])
+        reach = REACH_SPACINGS * np.median(tree.query(xyz[:, :2], k=2)[0][:, 1])
+        points = tree.query_pairs(max(BOND_REACH_M, reach), output_type="ndarray")
     item, other = points.T
     slope = -normal[:, :2] / np.where(np.abs(normal[:, 2]) < UPRIGHT, 1.0, normal[:, 2])[:, None]
     between = xyz[other] - xyz[item]
@@ -260,18 +252,16 @@ def find_directions(area: shapely.Geometry, roofs: Roofs) -> np.ndarray:
         for p in shapely.get_parts(area.simplify(STRAIGHT_M))
         if not p.is_empty
     ]
-    edges = np.concatenate(rings)
-    steep = np.hypot(*normal[:, :2].T)
-    angle = np.r_[np.arctan2(normal[:, 1], normal[:, 0]), np.arctan2(edges[:, 1], edges[:, 0])]
-    weight = np.r_[steep / max(steep.sum(), 1e-9), np.hypot(*edges.T) / np.hypot(*edges.T).sum()]
+    x, y = np.concatenate([normal[:, :2], *rings]).T
+    steep, long = np.split(np.hypot(x, y), [len(normal)])
+    weight = np.r_[steep / max(steep.sum(), 1e-9), long / long.sum()]
     candidates = np.radians(np.arange(0.0, 90.0, 1.0))
-    support = measure_support(candidates, angle, weight, math.radians(DIRECTION_DEG))
+    support = measure_support(candidates, np.arctan2(y, x), weight, math.radians(DIRECTION_DEG))
     result: list[float] = []
     for k in np.argsort(-support):
-        mask = all(
-            abs(quarter_gap(candidates[k] - other)) > math.radians(APART_DEG) for other in result
-        )
-        if mask and support[k] > LEAST_SUPPORT * weight.sum() and len(result) < MOST_DIRECTIONS:
+        gaps = [abs(quarter_gap(candidates[k] - other)) for other in result]
+        is_new = min(gaps, default=math.pi) > math.radians(APART_DEG)
+        if is_new and support[k] > LEAST_SUPPORT * weight.sum() and len(result) < MOST_DIRECTIONS:
             result.append(candidates[k])
     return np.array([turned for angle in result for turned in (angle, angle + 0.5 * math.pi)])
 
@@ -296,16 +286,12 @@ def refine_cut(cut: Cut, bonds: Bonds) -> Cut | None:
         other
         for turn in np.radians(FINE_TURNS_DEG)
         for other in cuts_along(angle + turn, nearby, FINE_LINE_M)
-    ]
-    template = [
-        other
-        for other in candidates
         if abs(other.normal @ cut.middle - other.offset) < FINE_SHIFT_M
         and other.length > 0.7 * cut.length
     ]
-    if not template:
+    if not candidates:
         return None
-    best = max(template, key=lambda other: other.gain)
+    best = max(candidates, key=lambda other: other.gain)
     item, other = bonds.across(best).T
     crossing = bonds.among((np.minimum(item, other) < NEXT_M) & (np.maximum(item, other) > -NEXT_M))
     whole = cuts_along(math.atan2(best.normal[1], best.normal[0]), crossing, FINE_LINE_M)
@@ -394,16 +380,12 @@ def cut_area(area: shapely.Geometry, cut: Cut) -> list[shapely.Geometry]:
     """Return the parts of `area` after a cut, together where they join beyond its ends."""
     distant = 2.0 * math.hypot(*np.ptp(np.array(area.bounds).reshape(2, 2), axis=0)) + 10.0
     lower, upper = cut.middle @ cut.along - distant, cut.middle @ cut.along + distant
-    halves = [
-        [cut.at(lower), cut.at(upper), cut.at(upper, side * distant), cut.at(lower, side * distant)]
-        for side in (-1, 1)
-    ]
-    halves = [intersect(area, shapely.Polygon(half)) for half in halves]
-    parts = [part for half in halves for part in shapely.get_parts(half) if part.area > 0.0]
+    line, parts = [cut.at(lower), cut.at(upper)], []
+    for away in (-distant, distant):
+        half = shapely.Polygon([*line, cut.at(upper, away), cut.at(lower, away)])
+        parts += [part for part in shapely.get_parts(intersect(area, half)) if part.area > 0.0]
     group, fixed = list(range(len(parts))), cut.runs[cut.runs[:, 2] == 0]
-    for segment in shapely.get_parts(
-        shapely.intersection(area, shapely.LineString([cut.at(lower), cut.at(upper)]))
-    ):
+    for segment in shapely.get_parts(shapely.intersection(area, shapely.LineString(line))):
         u = shapely.get_coordinates(segment) @ cut.along
         if not segment.length or not ((fixed[:, 0] < u.max()) & (fixed[:, 1] > u.min())).any():
             continue
@@ -418,13 +400,15 @@ def cut_area(area: shapely.Geometry, cut: Cut) -> list[shapely.Geometry]:
 
 def with_crumbs(sides: list[shapely.Geometry], roofs: Roofs) -> list[shapely.Geometry]:
     """Return the sides as large as a house, with the smaller ones nearest to each."""
-    is_large = [roof_m2(side, roofs) >= LEAST_HOUSE_M2 for side in sides]
-    houses = [[side] for side, large in zip(sides, is_large, strict=True) if large]
-    if len(houses) < 2:
+    large: list[shapely.Geometry] = []
+    crumbs: list[shapely.Geometry] = []
+    for side in sides:
+        (large if roof_m2(side, roofs) >= LEAST_HOUSE_M2 else crumbs).append(side)
+    if len(large) < 2:
         return [join_areas(sides)]
-    for side, large in zip(sides, is_large, strict=True):
-        if not large:
-            houses[int(np.argmin([side.distance(house[0]) for house in houses]))].append(side)
+    houses = [[side] for side in large]
+    for side in crumbs:
+        houses[int(np.argmin(shapely.distance(side, large)))].append(side)
     return [join_areas(house) for house in houses]
 
 

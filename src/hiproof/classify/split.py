@@ -7,6 +7,7 @@ import warnings
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import scipy
@@ -131,7 +132,7 @@ def find_roofs_around(
     """
     squares = list_squares(box, GAPS_M[-1])
     while True:
-        roofs = search.find(squares, lambda done, total: progress("ground", done, total))
+        roofs = search.find(partial(progress, "ground"), squares)
         if not len(roofs):
             return roofs
         gap_m = read.split_gap_m or adapted_gap(xyz[roofs, :2])
@@ -173,8 +174,8 @@ def select_roof_points(
     """
     if read.roofs == "alone":
         return select_roof_candidates(cloud, read.ground_classes), True, []
-    index = building_points(cloud, read.building_classes) if read.roofs != "shape" else None
-    if index is not None:
+    index = np.flatnonzero(np.isin(cloud.classes, read.building_classes))
+    if read.roofs != "shape" and cloud.classification is not None and len(index):
         return index, False, []
     unclassified = select_unclassified(cloud)
     is_chosen = read.building_classes != ReadSettings().building_classes
@@ -184,35 +185,22 @@ def select_roof_points(
         return unclassified, True, []
     if unclassified is not None and is_roofs_only(cloud.xyz[unclassified]):
         return unclassified, True, []
-    failed: list[FoundBuilding] = []
-    search = RoofSearch(
-        cloud,
-        read.ground_classes,
-        lambda index, error: failed.append(make_failed_place(index, cloud.xyz, error)),
-    )
+    search = RoofSearch(cloud, read.ground_classes)
     if box is None:
-        roofs = search.find(progress=lambda done, total: progress("ground", done, total))
+        roofs = search.find(partial(progress, "ground"))
     else:
         roofs = find_roofs_around(search, cloud.xyz, read, box, progress)
     if read.roofs == "auto":
-        text = (
+        warnings.warn(
             f"the cloud has no building class ({classes_text(read.building_classes)}): its roofs "
-            "were found by shape"
+            "were found by shape",
+            InputWarning,
         )
-        warnings.warn(text, InputWarning)
-    return roofs, False, failed
+    return roofs, False, [make_failed_place(index, cloud.xyz, e) for index, e in search.failed]
 
 
 def classes_text(classes: tuple[int, ...]) -> str:
     return " or ".join(map(str, classes))
-
-
-def building_points(cloud: PointCloud, classes: tuple[int, ...]) -> np.ndarray | None:
-    """Return ascending indices of the points of the building classes, or None."""
-    if cloud.classification is None:
-        return None
-    index = np.flatnonzero(np.isin(cloud.classification, classes))
-    return index if len(index) else None
 
 
 def select_unclassified(cloud: PointCloud) -> np.ndarray | None:
@@ -320,13 +308,13 @@ def houses_or_error(
             for index, area in find_houses(group, xyz, gap_m, split_houses)
         ]
     except Exception as error:
-        return [make_failed_place(group, xyz, error)]
+        return [make_failed_place(group, xyz, report_error(error))]
 
 
-def make_failed_place(index: np.ndarray, xyz: np.ndarray, error: Exception) -> FoundBuilding:
+def make_failed_place(index: np.ndarray, xyz: np.ndarray, error: ErrorReport) -> FoundBuilding:
     """Make the box of the points `index` with the error that happened there."""
     xy = xyz[index, :2]
-    return FoundBuilding(index, shapely.box(*xy.min(axis=0), *xy.max(axis=0)), report_error(error))
+    return FoundBuilding(index, shapely.box(*xy.min(axis=0), *xy.max(axis=0)), error)
 
 
 def find_houses(
@@ -336,12 +324,13 @@ def find_houses(
     area = cell_area(xyz[group, :2], gap_m / 2)
     if not split_houses:
         return [(group, area)]
-    houses, remainder = [], np.ones(len(group), bool)
+    houses, remainder = [], group
     for house in separate_houses(xyz[group], area, gap_m):
-        inside = remainder & shapely.intersects_xy(house, *xyz[group, :2].T)
-        remainder &= ~inside
-        houses.append((group[inside], house))
-    return [(index, house) for index, house in houses if len(index)]
+        inside = shapely.intersects_xy(house, *xyz[remainder, :2].T)
+        if inside.any():
+            houses.append((remainder[inside], house))
+        remainder = remainder[~inside]
+    return houses
 
 
 def hull_area(xy: np.ndarray) -> float:

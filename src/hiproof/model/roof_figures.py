@@ -90,21 +90,20 @@ def roof_figures(solid: Solid) -> RoofFigures:
     """
     if not solid.select_faces(ROOF):
         raise ValueError("its solid has no RoofSurface")
-    origin = solid.vertices.mean(axis=0)
-    shell = solid.shell
-    area, (corners, plan) = shell.face_areas, cut_roof(solid, shell)
-    is_roof = np.array([face.kind == ROOF for face in solid.faces])
+    z_origin, shell = float(solid.vertices.mean(axis=0)[2]), solid.shell
+    area, is_roof = shell.face_areas, np.array([face.kind == ROOF for face in solid.faces])
+    corners, plan = cut_roof(solid, shell)
     slope, azimuth = slopes_and_azimuths(area, is_roof)
     places, ends = shell.corners[corners], corners[:, 1:]
     faces = shell.face_of[ends[:, 0]]
     edges = roof_edges(places[:, 1:], shell.index[ends], area[faces], faces)
-    heights = roof_heights(np.sort(places[:, :, 2], axis=1), plan, float(origin[2]))
-    eave = find_eave_height(edges) + float(origin[2])
+    heights = roof_heights(np.sort(places[:, :, 2], axis=1), plan, z_origin)
+    eave = find_eave_height(edges) + z_origin
     size = np.where(is_roof, np.sqrt((area * area).sum(axis=1)), 0.0)
     largest = int(size.argmax())
     return RoofFigures(
         **heights,
-        h_ridge=find_ridge_height(edges) + float(origin[2]),
+        h_ridge=find_ridge_height(edges) + z_origin,
         # it is rounded, and no eave leaves the roof
         h_eave=min(max(eave, heights["h_min"]), heights["h_max"]),
         h_base=find_base_height(solid),
@@ -126,9 +125,11 @@ def roof_heights(z: np.ndarray, plan: np.ndarray, z_origin: float) -> dict[str, 
     A share of the roof's area lies below these two. Triangles are given by their corners' heights
     `z` (t, 3) over `z_origin`, in order, and their areas in plan (t,).
     """
-    heights = {"h_min": z[:, 0].min(), "h_max": z[:, 2].max()}
-    heights |= {
-        name: find_level(share, z, plan) for name, share in (("h_50p", 0.5), ("h_70p", 0.7))
+    heights = {
+        "h_min": z[:, 0].min(),
+        "h_max": z[:, 2].max(),
+        "h_50p": find_level(0.5, z, plan),
+        "h_70p": find_level(0.7, z, plan),
     }
     return {name: float(height + z_origin) for name, height in heights.items()}
 
@@ -219,12 +220,8 @@ def find_eave_height(edges: RoofEdges) -> float:
     without one, all its outer edges. Those of a face share its area by their length: a low annex
     has long ones, all around.
     """
-    ordered = np.sort(edges.number)
-    outer = (
-        np.searchsorted(ordered, edges.number, side="right")
-        - np.searchsorted(ordered, edges.number)
-        == 1
-    )
+    _, number, counts = np.unique(edges.number, return_inverse=True, return_counts=True)
+    outer = counts[number] == 1
     eaves = outer & edges.is_level & ~edges.falls_away
     selection = eaves if eaves.any() else outer
     length, face = edges.length[selection], edges.face[selection]

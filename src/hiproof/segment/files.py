@@ -14,6 +14,8 @@ from ..read.points.pointcloud import read_points
 from ..settings import Settings
 from .inference import SHIPPED_WEIGHTS, Segmentation, load, segment
 
+# The number of a building, its file, its points (n, 3) and what was found of them.
+Labelled = tuple[int, Path, np.ndarray, Segmentation]
 EXTRA_DIMENSIONS = (("roof_type", "uint8"), ("not_roof", "float32"), ("building", "uint32"))
 
 
@@ -41,14 +43,12 @@ def segment_files(clouds: list[Path], out: Path, settings: Settings) -> dict[Pat
     if not labelled:
         text = "; ".join(f"{path}: {reason}" for path, reason in failures.items())
         raise InputError(f"expected at least one building to label, got none ({text})")
-    write_points(out, labelled, model.types, crs, units)
+    write_points(out, labelled, crs, units)
     write_table(out.with_suffix(".csv"), labelled, model.types)
     return failures
 
 
-def write_points(
-    out: Path, labelled: list[tuple[int, Path, np.ndarray, Segmentation]], types, crs, units: Units
-) -> None:
+def write_points(out: Path, labelled: list[Labelled], crs, units: Units) -> None:
     """Write points in `units`, to a thousandth, with their extra dimensions."""
     xyz = units.from_metres(np.concatenate([points for _, _, points, _ in labelled]))
     header = laspy.LasHeader(point_format=6, version="1.4")
@@ -71,9 +71,7 @@ def write_points(
         raise OutputError(f"expected to write {out}, got: {error}; choose another --out") from error
 
 
-def write_table(
-    path: Path, labelled: list[tuple[int, Path, np.ndarray, Segmentation]], types
-) -> None:
+def write_table(path: Path, labelled: list[Labelled], types) -> None:
     """Write a row a building: number, file, points, roof share, type, all probabilities."""
     try:
         with open(path, "w", newline="", encoding="utf-8") as file:

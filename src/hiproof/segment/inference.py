@@ -21,7 +21,8 @@ from ..extras import import_extra
 from ..log import count_things
 from ..settings import Settings
 from .arrange import Arrangement, Layout, arrange
-from .posterior import find_nearest_type
+from .posterior import find_nearest_type, softmax
+from .sampling import compute_inverse_shares
 
 FORMAT = "hiproof-roof-types-2"
 INPUT_NAMES = (
@@ -142,27 +143,21 @@ def segment(points: np.ndarray, settings: Settings | None = None) -> Segmentatio
 
 def run(model: LoadedNetwork, arrangements: list[Arrangement]) -> tuple[np.ndarray, np.ndarray]:
     """Point logits (B N, types + 1) and type logits (B, types) of arranged buildings."""
-    point_logits, type_logits = model.session.run(
-        list(OUTPUT_NAMES), stack_arrangements(arrangements, model.layout)
-    )
-    return point_logits, type_logits
+    return model.session.run(OUTPUT_NAMES, stack_arrangements(arrangements, model.layout))
 
 
 def stack_arrangements(arrangements: list[Arrangement], layout: Layout) -> dict[str, np.ndarray]:
     """Return the graph's inputs for B buildings, flat; indices are rows of the level above."""
-    sizes = (layout.points, *layout.levels)
-
-    def flat(indices, size):
-        return np.concatenate([index + i * size for i, index in enumerate(indices)])
-
-    groups = [flat([a.groups[level] for a in arrangements], sizes[level]) for level in range(3)]
-    ups = [
-        flat([a.up_indices[k] for a in arrangements], sizes[above]) for k, above in ((0, 3), (1, 1))
-    ]
-    weights = [np.concatenate([a.up_weights[k] for a in arrangements]) for k in (0, 1)]
+    of_levels = zip(*((*a.groups, *a.up_indices) for a in arrangements), strict=True)
+    above = (layout.points, *layout.levels, layout.levels[0])
+    *groups, up1, up2 = (
+        np.concatenate([index + i * size for i, index in enumerate(indices)])
+        for indices, size in zip(of_levels, above, strict=True)
+    )
+    weights = map(np.concatenate, zip(*(a.up_weights for a in arrangements), strict=True))
     features = np.concatenate([a.features for a in arrangements])
     radii = np.stack([a.radii for a in arrangements])
-    return dict(zip(INPUT_NAMES, (features, *groups, radii, *ups, *weights), strict=True))
+    return dict(zip(INPUT_NAMES, (features, *groups, radii, up1, up2, *weights), strict=True))
 
 
 def carried_back(
@@ -181,10 +176,7 @@ def carried_back(
     for start in range(0, len(xyz), CARRIED_CHUNK):
         piece = slice(start, start + CARRIED_CHUNK)
         distance, index = tree.query(xyz[piece], k=min(CARRIED_NEIGHBOURS, len(sampled)))
-        weight = 1.0 / (distance + 1e-3)
-        mean = np.einsum(
-            "nk,nkc->nc", weight / weight.sum(axis=1, keepdims=True), probability[index]
-        )
+        mean = np.einsum("nk,nkc->nc", compute_inverse_shares(distance), probability[index])
         not_roof[piece] = mean[:, -1]
         labels[piece] = np.where(mean[:, -1] > 0.5, NOT_ROOF, mean[:, :-1].argmax(axis=1))
     return labels, not_roof
@@ -236,11 +228,9 @@ def load(weights: str, device: str = "cpu") -> LoadedNetwork:
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     options.log_severity_level = 4
-    providers = (
-        ["CUDAExecutionProvider", "CPUExecutionProvider"]
-        if device == "cuda"
-        else ["CPUExecutionProvider"]
-    )
+    providers = ["CPUExecutionProvider"]
+    if device == "cuda":
+        providers.insert(0, "CUDAExecutionProvider")
     try:
         session = onnxruntime.InferenceSession(weights, options, providers=providers)
         metadata = session.get_modelmeta().custom_metadata_map
@@ -265,9 +255,3 @@ def load(weights: str, device: str = "cpu") -> LoadedNetwork:
 def import_onnxruntime(alternative: str = "") -> Any:
     """Import onnxruntime; InputError without it says how to do without, if that can be."""
     return import_extra("onnxruntime", "network", "recognising roofs", alternative)
-
-
-def softmax(logits: np.ndarray) -> np.ndarray:
-    """Return probabilities along the last axis, in float64."""
-    shifted = np.exp(np.asarray(logits, float) - logits.max(axis=-1, keepdims=True))
-    return shifted / shifted.sum(axis=-1, keepdims=True)

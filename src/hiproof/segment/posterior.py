@@ -54,39 +54,35 @@ def combine(
     finite_bics = {name: bic for name, bic in bics.items() if np.isfinite(bic)}
     names = [name for name in types if types[name] > 0 or name in finite_bics]
     names += [name for name in finite_bics if name not in types]
-    if not finite_bics or not types:
-        evidence_exponent = 1.0 if not types else 0.0
-        names = names if types else list(finite_bics)
     if not names:
         return {}
-    given_up = min(finite_bics.values(), default=0.0) + 2 * (
-        GIVEN_UP_NATS + GIVEN_UP_NATS_A_POINT * points
-    )
+    if not finite_bics or not types:
+        evidence_exponent = 0.0 if types else 1.0
+    behind = 2 * (GIVEN_UP_NATS + GIVEN_UP_NATS_A_POINT * points)
+    given_up = min(finite_bics.values(), default=0.0) + behind
     bic = np.array([finite_bics.get(name, given_up) for name in names])
-    log_posterior = (
-        np.array(list(log_prior(types, tuple(names)).values())) - evidence_exponent * bic / 2
-    )
-    posterior = np.exp(log_posterior - log_posterior.max())
-    posterior /= posterior.sum()
+    prior = np.array(list(log_prior(types, names).values()))
+    posterior = softmax(prior - evidence_exponent * bic / 2)
     ranked = np.argsort(-posterior, kind="stable")
     return {names[i]: float(posterior[i]) for i in ranked}
 
 
-def log_prior(types: dict[str, float], names: tuple[str, ...] = ()) -> dict[str, float]:
+def softmax(logits: np.ndarray) -> np.ndarray:
+    """Return probabilities along the last axis, in float64."""
+    shifted = np.exp(np.asarray(logits, float) - logits.max(axis=-1, keepdims=True))
+    return shifted / shifted.sum(axis=-1, keepdims=True)
+
+
+def log_prior(types: dict[str, float], names: Iterable[str] = ()) -> dict[str, float]:
     """Return the natural logarithm of the network's probabilities.
 
-    They are those of `names` (all of `types` by default), bounded below. A network may be wrong
-    with confidence; no evidence could undo a prior of zero.
+    They are those of `names` (all of `types` by default), of the nearest type for one that the
+    network does not know, or the mean. They are bounded below: a network may be wrong with
+    confidence, and no evidence could undo a prior of zero.
     """
-    return {
-        name: float(np.log(max(find_prior(name, types), SMALLEST_PRIOR)))
-        for name in names or tuple(types)
-    }
-
-
-def find_prior(name: str, types: dict[str, float]) -> float:
-    """Return the probability of a type, of the nearest that is known, else the mean."""
-    return types.get(find_nearest_type(name, types), 1.0 / max(len(types), 1))
+    mean = 1.0 / max(len(types), 1)
+    priors = {name: types.get(find_nearest_type(name, types), mean) for name in names or types}
+    return {name: float(np.log(max(p, SMALLEST_PRIOR))) for name, p in priors.items()}
 
 
 def choose_most_probable(
@@ -126,15 +122,8 @@ def find_nearest_type(name: str, known_types: Iterable[str]) -> str:
     ...     ("gable", "hip"))
     ('hip', 'shed')
     """
-    known_types = tuple(known_types)
-    if name in known_types or name not in CATALOGUE:
+    codes = {other: CATALOGUE[other].citygml_code for other in known_types if other in CATALOGUE}
+    if name in codes or name not in CATALOGUE:
         return name
     code = CATALOGUE[name].citygml_code
-    return next(
-        (
-            other
-            for other in known_types
-            if other in CATALOGUE and CATALOGUE[other].citygml_code == code
-        ),
-        name,
-    )
+    return next((other for other in codes if codes[other] == code), name)

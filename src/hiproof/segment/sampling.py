@@ -53,7 +53,8 @@ def arrange_cloud(xyz, count, level1, level2, level3, group_size):
     )
     up1, distance1 = group_points(xyz, level1, levels[3], INTERPOLATED, np.inf)
     up2, distance2 = group_points(xyz, count, levels[1], INTERPOLATED, np.inf)
-    weights = compute_inverse_shares(distance1), compute_inverse_shares(distance2)
+    shares = map(compute_inverse_shares, (distance1, distance2))
+    weights = tuple(share.astype(np.float32) for share in shares)
     return order, features, groups, radii.astype(np.float32), (up1, up2), weights
 
 
@@ -167,15 +168,13 @@ def group_points(xyz, centres, sources, count, radius):
     places = xyz[np.arange(centres) % len(xyz)]
     distances, indices = find_nearest(xyz[:sources], places, count, radius)
     is_found = np.isfinite(distances)
-    return np.where(is_found, indices, indices[:, :1]), np.where(
-        is_found, distances, distances[:, :1]
-    )
+    return tuple(np.where(is_found, found, found[:, :1]) for found in (indices, distances))
 
 
 def compute_inverse_shares(distances):
     """Return inverse-distance weights (s, k) with a sum of 1."""
     weights = 1.0 / (distances + 1e-3)
-    return (weights / weights.sum(axis=1, keepdims=True)).astype(np.float32)
+    return weights / weights.sum(axis=1, keepdims=True)
 
 
 def thin_to_grid(xyz, count, chunk=500_000):
