@@ -191,8 +191,7 @@ def test_known_shifts_are_found_or_told_where_no_class_marks_roofs(epoch, vector
 
 @pytest.mark.skipif(not SHARED.is_dir(), reason="no ../shared/data here")
 @pytest.mark.parametrize(
-    ("azimuth", "distance"),
-    [(0, 0.5), (45, 0.75), (90, 0.5), (180, 0.75), (225, 0.5), (270, 0.75)],
+    ("azimuth", "distance"), [(0, 0.5), (45, 0.75), (90, 0.5), (180, 0.75), (225, 0.5), (270, 0.75)]
 )
 def test_known_shifts_of_a_small_set_are_told(distance, azimuth, tmp_path):
     """The border of the cloud cuts 6 of 21 footprints, which were up to 1.2 m off."""

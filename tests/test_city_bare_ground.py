@@ -20,12 +20,13 @@ HOUSE, YARD = shapely.box(X, Y, X + 16, Y + 12), shapely.box(X + 9, Y, X + 16, Y
 WALLS_M = 5.0
 
 
-def scan(has_house=True, density=6.0, seed=0):
+def scan(has_house=True, density=4.0, seed=0, around=15):
     """Points and classes of level ground at ORIGIN's height with a flat house, its yard at a
     corner, in the middle.
     """
     rng = np.random.default_rng(seed)
-    xy = rng.uniform((X - 25, Y - 25), (X + 41, Y + 37), (int(density * 66 * 62), 2))
+    x0, y0, x1, y1 = HOUSE.buffer(around).bounds
+    xy = rng.uniform((x0, y0), (x1, y1), (int(density * (x1 - x0) * (y1 - y0)), 2))
     on_roof = shapely.intersects_xy(HOUSE - YARD, *xy.T) & has_house
     z = ORIGIN[2] + WALLS_M * on_roof + rng.normal(0, 0.03, len(xy))
     return np.column_stack([xy, z]), np.where(on_roof, 6, 2).astype(np.uint8)
@@ -63,7 +64,7 @@ def test_classes_that_footprints_made_hide_no_bare_ground(has_house, seed, tmp_p
     rng = np.random.default_rng(seed)
     xyz, _ = scan(has_house, density=2.0, seed=seed)
     inside = shapely.intersects_xy(HOUSE, *xyz[:, :2].T)
-    for corner in rng.uniform((X - 25, Y - 25), (X + 41, Y + 37), (300, 2)):
+    for corner in rng.uniform((X - 15, Y - 15), (X + 31, Y + 27), (140, 2)):
         is_thing = ((xyz[:, :2] > corner) & (xyz[:, :2] < corner + rng.uniform(2, 6, 2))).all(
             axis=1
         )
@@ -141,7 +142,7 @@ def test_heaps_of_the_building_class_on_bare_ground_are_no_building(tmp_path):
 @pytest.mark.parametrize("has_classes", [True, False])
 @pytest.mark.filterwarnings("ignore::hiproof.errors.InputWarning")
 def test_a_parcel_around_a_house_is_named(has_classes, tmp_path):
-    xyz, classes = scan(density=3.0)
+    xyz, classes = scan(density=3.0, around=25)
     parcel = shapely.box(X - 22, Y - 22, X + 38, Y + 34)
     record, _ = run(tmp_path, xyz, classes if has_classes else np.ones_like(classes), parcel)
     assert record["status"] == "no_building"

@@ -201,10 +201,7 @@ def test_a_square_in_which_no_roofs_can_be_found_is_one_failure(tmp_path, monkey
     x = {id: float(id.split("_")[1]) for id in expected}
     border = 250.0 * np.ceil(min(x.values()) / 250.0)
     fail_at(
-        monkeypatch,
-        buildings,
-        "classify_points",
-        np.array([border + 60.0, scene.xyz[:, 1].mean()]),
+        monkeypatch, buildings, "classify_points", np.array([border + 60.0, scene.xyz[:, 1].mean()])
     )
     summary = run([cloud], tmp_path / "disturbed", with_footprints=False)
     rows = by_id(tmp_path / "disturbed")

@@ -195,10 +195,7 @@ def test_a_wrapper_made_for_loaded_code_carries_arrays_tuples_and_errors(town):
     assert run(town, ASK_PAIRS) == "[0. 0.] [ True]\n"
     for _ in range(2):
         pair = "Pair(first=array([ True]), second=array([0., 0.]))"
-        assert run(town, ASK_PAIRS + ASK_PAIRS_MORE).splitlines()[1:] == [
-            pair,
-            "expected a number",
-        ]
+        assert run(town, ASK_PAIRS + ASK_PAIRS_MORE).splitlines()[1:] == [pair, "expected a number"]
 
 
 @pytest.mark.skipif(

@@ -52,9 +52,13 @@ def is_whole(places):
 
 
 @at_every_size
-def test_the_viewer_shows_the_whole_scene(browser, view, size):
+def test_the_viewer_shows_the_whole_scene_and_axe_finds_nothing(browser, view, size):
     with open_page(browser, view, size) as page:
         page.evaluate(SETTLE)
+        assert not is_too_wide(page) and list_complaints(page) == []
+        page.evaluate("() => show({ tile: scene.layers[0].tile, row: 0 })")
+        assert "house-1" in page.inner_text("#details")
+        assert not is_too_wide(page) and list_complaints(page) == []
         for shape in (size, size[::-1]):
             page.set_viewport_size({"width": shape[0], "height": shape[1]})
             page.wait_for_timeout(200)
@@ -64,36 +68,20 @@ def test_the_viewer_shows_the_whole_scene(browser, view, size):
 
 
 @at_every_size
-def test_the_report_shows_the_whole_scene_and_a_whole_building(browser, report, size):
+def test_the_report_shows_a_whole_scene_and_building_and_axe_finds_nothing(browser, report, size):
     with open_page(browser, report, size) as page:
+        assert not is_too_wide(page) and list_complaints(page) == []
         for action in ("viewer.home()", "viewer.turn(2, 0)", "viewer.turn(0, 1.5)"):
             page.evaluate(f"() => {{ {action}; }}")
             assert is_whole(project_on_canvas(page, "viewer", "mesh.corners"))
         page.fill("#find", "house-1")
         page.keyboard.press("Enter")
         assert "house-1" in page.inner_text("#details")
+        assert not is_too_wide(page) and list_complaints(page) == []
         house = "mesh.corners.filter((_, i) => mesh.owner[Math.floor(i / 9)] === selected)"
         assert is_whole(project_on_canvas(page, "viewer", house))
         page.evaluate("() => viewer.zoom(0.5)")
         assert not is_whole(project_on_canvas(page, "viewer", house))
-
-
-@at_every_size
-def test_axe_finds_nothing_in_the_viewer(browser, view, size):
-    with open_page(browser, view, size) as page:
-        page.evaluate(SETTLE)
-        assert not is_too_wide(page) and list_complaints(page) == []
-        page.evaluate("() => show({ tile: scene.layers[0].tile, row: 0 })")
-        assert "house-1" in page.inner_text("#details")
-        assert not is_too_wide(page) and list_complaints(page) == []
-
-
-@at_every_size
-def test_axe_finds_nothing_in_the_report(browser, report, size):
-    with open_page(browser, report, size) as page:
-        assert not is_too_wide(page) and list_complaints(page) == []
-        page.evaluate("() => show(0)")
-        assert not is_too_wide(page) and list_complaints(page) == []
 
 
 def test_the_viewer_works_by_keys(browser, view):

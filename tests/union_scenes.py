@@ -62,10 +62,7 @@ def draw_volumes(rng, most_volumes=5, replacing=0.2):
     base = np.r_[np.zeros(OFFSET0), [np.inf] * LEVEL, -1.0, np.zeros(COLUMNS - OFFSET0 - N_PLANES)]
     base[U0 : V1 + 1] = -1e4, 1e4, -1e4, 1e4
     return np.vstack(
-        [
-            base,
-            *[draw_volume(rng, replacing) for _ in range(rng.integers(1, most_volumes + 1))],
-        ]
+        [base, *[draw_volume(rng, replacing) for _ in range(rng.integers(1, most_volumes + 1))]]
     )
 
 

@@ -9,7 +9,6 @@ from lxml import etree
 
 from hiproof.cli.app import app
 from hiproof.enrich import run as enrich_module
-from hiproof.enrich import run as write_module
 from hiproof.enrich.run import enrich_run
 from hiproof.errors import HiproofError, InputError, OutputError
 from hiproof.parametric.finished import open_run
@@ -42,9 +41,7 @@ def read_features(folder):
 
 @pytest.fixture
 def run(tmp_path):
-    folder = write_street(tmp_path / "run", make_street())
-    build_file(folder / "parameters.jsonl", tmp_path / "built")
-    return folder
+    return write_street(tmp_path / "run", make_street())
 
 
 def test_every_file_has_the_answers(run):
@@ -65,15 +62,6 @@ def test_every_file_has_the_answers(run):
     assert json.loads((out / "run.json").read_text())["enriched"]["touch_m"] == 0.3
 
 
-def test_the_run_s_own_files_stay(run, tmp_path):
-    before = read_files(run)
-    enrich_run(run)
-    assert read_files(run) == before
-    build_file(run / "parameters.jsonl", tmp_path / "again")
-    for name in FILES[:2]:
-        assert (tmp_path / "again" / name).read_bytes() == (tmp_path / "built" / name).read_bytes()
-
-
 def test_a_second_call_replaces_the_first(run):
     enrich_run(run, settings=EnrichSettings(touch_m=0.0))
     first = read_files(run / "enriched")
@@ -82,8 +70,10 @@ def test_a_second_call_replaces_the_first(run):
     assert read_files(run / "enriched") == first
 
 
-def test_enriched_files_are_models(run):
+def test_enriched_files_are_models_and_the_run_s_own_stay(run):
+    before = read_files(run)
     enrich_run(run)
+    assert read_files(run) == before
     models = {building.id: building for building in open_run(run / "enriched")}
     own = {building.id: building for building in open_run(run)}
     assert list(models) == list(own)
@@ -164,8 +154,8 @@ def test_a_building_that_fails_is_named_and_the_others_have_answers(run, monkeyp
             raise ArithmeticError("the wall is bent")
         return answer(town, number, *rest)
 
-    answer = write_module.answer
-    monkeypatch.setattr(write_module, "answer", fail_at_h1)
+    answer = enrich_module.answer
+    monkeypatch.setattr(enrich_module, "answer", fail_at_h1)
     result = CliRunner().invoke(app, ["enrich", str(run), "--jobs", "1"])
     assert result.exit_code == 1 and "5 of 6 buildings enriched" in result.output
     assert "not enriched: building h1: ArithmeticError: the wall is bent" in result.output
@@ -186,12 +176,12 @@ def test_failures_of_an_interrupted_command_are_kept(run, monkeypatch):
             raise KeyboardInterrupt
         return answer(town, number, *rest)
 
-    answer, interrupted = write_module.answer, []
+    answer, interrupted = enrich_module.answer, []
     monkeypatch.setattr(enrich_module, "BLOCK_BUILDINGS", 2)
-    monkeypatch.setattr(write_module, "answer", fail)
+    monkeypatch.setattr(enrich_module, "answer", fail)
     with pytest.raises(KeyboardInterrupt):
         enrich_run(run, processes=1)
-    monkeypatch.setattr(write_module, "answer", answer)
+    monkeypatch.setattr(enrich_module, "answer", answer)
     resumed = enrich_run(run, processes=1)
     assert [failure.id for failure in resumed.failures] == ["h1"] and resumed.exit_code == 1
 

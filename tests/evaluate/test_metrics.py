@@ -13,14 +13,7 @@ from hiproof.city.folder.ledger import Ledger
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.errors import InputError
 from hiproof.evaluate.distance import point_surface_distances, vertical_distances
-from hiproof.evaluate.metrics import (
-    iou,
-    nodata_share,
-    plan_outline,
-    psd,
-    quality,
-    unexplained_area,
-)
+from hiproof.evaluate.metrics import iou, nodata_share, plan_outline, psd, quality, unexplained_area
 from hiproof.evaluate.run import evaluate_run
 
 AMSTERDAM = SHARED / "data/amsterdam_west"

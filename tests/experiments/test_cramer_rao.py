@@ -6,10 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from experiments.cramer_rao import (
-    compute_bounds,
-    compute_height_information,
-)
+from experiments.cramer_rao import compute_bounds, compute_height_information
 
 from hiproof.primitives import CATALOGUE
 

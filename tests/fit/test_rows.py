@@ -9,11 +9,7 @@ from hiproof.model import Roof
 from points_of_roofs import sample_heights
 
 OUTLINE = shapely.box(-12, -5, 12, 5)
-EAVES = {
-    "two": (-9.0, 3.0),
-    "four": (-9.0, -5.0, -1.0, 3.0),
-    "a row with a gap": (-9.0, -5.0, 7.0),
-}
+EAVES = {"two": (-9.0, 3.0), "four": (-9.0, -5.0, -1.0, 3.0), "a row with a gap": (-9.0, -5.0, 7.0)}
 
 
 def make_height(begins):

@@ -268,7 +268,4 @@ def test_a_gable_beside_a_truncated_gable_is_no_gambrel():
         upper.kappa,
         upper.translation + [0.0, 12.0, 0.0],
     )
-    assert sorted(part.type for part in fit_parts([lower, shifted])) == [
-        "gable",
-        "truncated_gable",
-    ]
+    assert sorted(part.type for part in fit_parts([lower, shifted])) == ["gable", "truncated_gable"]

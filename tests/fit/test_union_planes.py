@@ -15,10 +15,8 @@ from hiproof.fit.candidates.planes import (
     bound_rows,
     fill_point_gains,
     find_best_rectangle,
-    find_median,
     find_neighbours,
     select_distinct,
-    solve_three,
     truncate_cost,
 )
 from hiproof.fit.candidates.volumes import DIRECTION, U0, V1, price_volume
@@ -40,17 +38,6 @@ def find_rectangle(gain, least_sum):
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_three_unknowns_solve_their_system(seed):
-    rows = np.random.default_rng(seed).normal(size=(5, 3))
-    matrix, right = rows.T @ rows, rows[0] - rows[1]
-    *unknowns, is_regular = solve_three(*matrix[np.triu_indices(3)], *right)
-    assert is_regular
-    assert np.allclose(matrix @ unknowns, right)
-    matrix[:, seed % 3] = matrix[seed % 3] = 0.0
-    assert not solve_three(*matrix[np.triu_indices(3)], *right)[3]
-
-
-@pytest.mark.parametrize("seed", range(8))
 def test_best_rectangle_is_that_of_brute_force(seed):
     gain = np.random.default_rng(seed).normal(-0.1, 1.0, (1 + seed % 5, 6))
     score, i0, i1, j0, j1 = find_rectangle(gain, -np.inf)
@@ -68,15 +55,6 @@ def test_a_rectangle_is_found_only_above_what_is_asked(seed):
     assert (i1 - i0) * (j1 - j0) == 0
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_no_rectangle_reaches_beyond_its_rows(seed):
-    gain = np.random.default_rng(seed).normal(-0.3, 1.0, (4, 5))
-    reach = np.empty(5)
-    bound_rows(gain, reach)
-    for first in range(4):
-        assert search_all_rectangles(gain[first:]) <= reach[first] + 1e-12
-
-
 @pytest.mark.parametrize("n", [1, 6, 200])
 def test_neighbours_are_those_of_sorting_all_distances(n):
     u, v = np.random.default_rng(n).uniform(0.0, 8.0, (2, n))
@@ -89,12 +67,6 @@ def test_neighbours_are_those_of_sorting_all_distances(n):
     assert nearby[:count].tolist() == np.nonzero(distance < NEIGHBOUR_RADIUS_M)[0].tolist()
     assert n_kept == min(count, 17)
     assert nearest[:n_kept].tolist() == np.argsort(distance)[:n_kept].tolist()
-
-
-@pytest.mark.parametrize("count", range(1, 18))
-def test_the_median_of_few_is_the_median(count):
-    values = np.random.default_rng(count).normal(0.0, 1.0, count).round(1)
-    assert find_median(values.copy()) == pytest.approx(np.median(values))
 
 
 @pytest.mark.parametrize("count", [1, 2, 4])

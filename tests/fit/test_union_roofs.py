@@ -23,10 +23,7 @@ from union_scenes import compute_lowest, draw_member, list_corners
 
 WINGED = [(kind, type) for kind in ("L", "T", "U", "cross") for type in ("gable", "hip")]
 # Slopes on some sides beside a level top are told as two parts now and then.
-SPLIT = (
-    "half_mansard",
-    "corner_mansard",
-)
+SPLIT = ("half_mansard", "corner_mansard")
 DEAD_M = 0.06  # what residuals may be without a cost: slopes that differ by less are told as equal
 
 

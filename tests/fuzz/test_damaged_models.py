@@ -3,6 +3,7 @@ traceback or a wrong file.
 """
 
 import re
+from functools import cache
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -51,13 +52,14 @@ def run_folder(tmp_path):
     return tmp_path / "run"
 
 
-def cases(make, tmp_path_factory):
-    return make(tmp_path_factory.mktemp("models"))
+@pytest.fixture(scope="module")
+def cases(tmp_path_factory):
+    return cache(lambda make: make(tmp_path_factory.mktemp("models")))
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_damaged_files_are_refused_with_a_sentence(command, run_folder, tmp_path_factory):
-    for name, content in cases(damaged_files, tmp_path_factory).items():
+def test_damaged_files_are_refused_with_a_sentence(command, run_folder, cases):
+    for name, content in cases(damaged_files).items():
         (run_folder / MODELS).write_bytes(content)
         code, output = answer(COMMANDS[command], run_folder)
         assert (
@@ -75,10 +77,10 @@ def test_damaged_files_are_refused_with_a_sentence(command, run_folder, tmp_path
 @pytest.mark.parametrize("command", COMMANDS)
 @pytest.mark.parametrize("make", [damaged_models, invalid_models])
 def test_a_damaged_building_is_named_and_the_others_are_used(
-    make, command, run_folder, tmp_path_factory, caplog
+    make, command, run_folder, cases, caplog
 ):
     written = run_folder / WRITTEN[command]
-    for name, content in cases(make, tmp_path_factory).items():
+    for name, content in cases(make).items():
         (run_folder / MODELS).write_bytes(content)
         written.unlink(missing_ok=True)
         caplog.clear()
@@ -104,8 +106,8 @@ def count_bad_solids(path):
     return check.count_bad([check.check_file(path, 0.01)])
 
 
-def test_damaged_files_cannot_be_checked(run_folder, tmp_path_factory):
-    for name, content in cases(damaged_files, tmp_path_factory).items():
+def test_damaged_files_cannot_be_checked(run_folder, cases):
+    for name, content in cases(damaged_files).items():
         (run_folder / MODELS).write_bytes(content)
         code, output = answer(count_bad_solids, run_folder / MODELS)
         assert code == 2 and output.startswith("expected") and "got" in output, name
@@ -119,17 +121,17 @@ def test_damaged_files_cannot_be_checked(run_folder, tmp_path_factory):
     ],
 )
 def test_damaged_buildings_and_solids_that_are_none_are_invalid(
-    write, told, run_folder, tmp_path_factory, capsys
+    write, told, run_folder, cases, capsys
 ):
-    for name, content in cases(write, tmp_path_factory).items():
+    for name, content in cases(write).items():
         (run_folder / MODELS).write_bytes(content)
         assert answer(count_bad_solids, run_folder / MODELS)[0] == 1, name
         assert told in capsys.readouterr().out, name
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_unusual_models_are_used(command, run_folder, tmp_path_factory):
-    for name, content in cases(odd_models, tmp_path_factory).items():
+def test_unusual_models_are_used(command, run_folder, cases):
+    for name, content in cases(odd_models).items():
         (run_folder / MODELS).write_bytes(content)
         assert answer(COMMANDS[command], run_folder)[0] == 0, name
 

@@ -11,11 +11,7 @@ from hypothesis.extra.numpy import arrays
 
 from hiproof.errors import FitError
 from hiproof.geometry.alpha_shape import alpha_shape
-from hiproof.geometry.arrays import (
-    list_distinct,
-    sort_order,
-    sort_values,
-)
+from hiproof.geometry.arrays import list_distinct, sort_order, sort_values
 from hiproof.geometry.components import label_components
 from hiproof.geometry.grid import count_cells, number_cells
 from hiproof.geometry.point_grid import PointGrid

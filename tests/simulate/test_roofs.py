@@ -9,12 +9,7 @@ import shapely
 
 from hiproof.errors import InputError
 from hiproof.primitives import CATALOGUE
-from hiproof.simulate import (
-    COMPOUND_KINDS,
-    ROOF_TYPES,
-    random_building,
-    random_compound,
-)
+from hiproof.simulate import COMPOUND_KINDS, ROOF_TYPES, random_building, random_compound
 from hiproof.simulate.roofs import assemble, make_part
 
 SEEDS = range(12)

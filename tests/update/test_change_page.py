@@ -48,8 +48,13 @@ def report(tmp_path_factory):
 
 
 @at_every_size
-def test_each_cloud_and_each_model_can_be_hidden(browser, report, size):
+def test_the_page_says_what_to_do_next_and_hides_each_cloud_and_model(browser, report, size):
     with open_page(browser, report, size) as page:
+        assert not is_too_wide(page) and list_complaints(page) == []
+        first = page.locator("main section").first
+        steps = first.locator("li strong").all_inner_texts()
+        assert steps == ["1 building", "1 building", "3 roofs"]
+        assert first.inner_text().startswith("What to do next")
         assert page.evaluate(VISIBLE) == ["points before", "model after", "points after"]
         low, high = page.evaluate(HEIGHTS)
         assert high - low == pytest.approx(RAISED_M, abs=0.01)
@@ -63,21 +68,6 @@ def test_each_cloud_and_each_model_can_be_hidden(browser, report, size):
         assert page.evaluate(VISIBLE) == ["model before", "points before"]
 
 
-@at_every_size
-def test_the_page_begins_with_what_to_do_next(browser, report, size):
-    with open_page(browser, report, size) as page:
-        first = page.locator("main section").first
-        steps = first.locator("li strong").all_inner_texts()
-        assert steps == ["1 building", "1 building", "3 roofs"]
-        assert first.inner_text().startswith("What to do next")
-
-
 def test_a_run_that_is_no_update_has_no_next_steps(tmp_path):
     write_sample_run(tmp_path)
     assert "What to do next" not in report_html(evaluate_run(tmp_path))
-
-
-@at_every_size
-def test_axe_finds_nothing_in_the_comparison(browser, report, size):
-    with open_page(browser, report, size) as page:
-        assert not is_too_wide(page) and list_complaints(page) == []

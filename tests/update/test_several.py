@@ -93,8 +93,7 @@ def test_points_of_both_surveys_count_and_lie_in_the_frame_of_the_newest(houses,
 
 
 @pytest.mark.parametrize(
-    ("raised_m", "expected"),
-    [(RAISED_M, {"unchanged": 4}), (0.0, {"unchanged": 3, "changed": 1})],
+    ("raised_m", "expected"), [(RAISED_M, {"unchanged": 4}), (0.0, {"unchanged": 3, "changed": 1})]
 )
 def test_an_update_compares_each_house_with_the_surveys_of_its_model(
     raised_m, expected, houses, tmp_path

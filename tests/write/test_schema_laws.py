@@ -34,12 +34,7 @@ def test_cityjson_features_hold_their_object_and_its_vertices(features):
     assert len(set(ids)) == len(ids) == 6
     for feature in features:
         assert feature["type"] == "CityJSONFeature"
-        assert set(feature) == {
-            "type",
-            "id",
-            "CityObjects",
-            "vertices",
-        }
+        assert set(feature) == {"type", "id", "CityObjects", "vertices"}
         assert list(feature["CityObjects"]) == [feature["id"]]
         (city_object,) = feature["CityObjects"].values()
         assert city_object["type"] == "Building" and isinstance(city_object["attributes"], dict)
