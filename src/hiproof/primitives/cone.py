@@ -7,11 +7,10 @@ is the depth of the plan: half of the width over a half circle.
 """
 
 import math
-from collections.abc import Callable, Mapping
 from functools import cache
 
 from .contract import Primitive
-from .facets import count_sides, find_apothem, find_sides, list_facings, make_rim, with_facets
+from .facets import find_apothem, list_facings, make_rim, with_facets
 from .table import make_shape
 
 BROACH_SIDES = 8  # Sides of the spire of most church towers that have one.
@@ -45,19 +44,8 @@ def make_half_cone(sides: int) -> Primitive:
     return make_shape("half_cone", constants, rim=rim)
 
 
-def make_round(
-    make: Callable[[int], Primitive], measure: Callable[[Mapping[str, float]], float]
-) -> Primitive:
-    """Return the shape with as many facets as its diameter (m), by `measure`, asks for."""
-    return with_facets(
-        make,
-        choose=lambda p: count_sides(measure(p)),
-        refine=lambda p, chord_m: make(find_sides(measure(p) / 2, chord_m)),
-    )
-
-
-CONE = make_round(make_cone, lambda p: p["length"])
+CONE = with_facets(make_cone)
 # by the longer diameter of the whole ellipse
-HALF_CONE = make_round(make_half_cone, lambda p: max(p["width"], 2.0 * p["length"]))
+HALF_CONE = with_facets(make_half_cone, lambda p: max(p["width"], 2.0 * p["length"]))
 BROACH = make_pointed("broach", BROACH_SIDES, 1.0)
 HEXAGONAL_SPIRE = make_pointed("hexagonal_spire", HEXAGON_SIDES, 1.0)

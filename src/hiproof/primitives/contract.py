@@ -181,18 +181,8 @@ class Primitive:
         """Return the variant with the teeth, facets or parameters of `theta_p`, else itself."""
         if self.choose is not None:
             return self.variants[self.choose(theta_p)]
-        if self.strips == 1:
-            matching = [
-                variant for variant in self.variants if set(variant.parameters) <= set(theta_p)
-            ]
-            return max(matching, key=lambda variant: len(variant.parameters), default=self)
-        for variant in self.variants:
-            if variant.strips == theta_p.get("teeth", self.strips):
-                return variant
-        raise FitError(
-            f"expected 2 to 6 teeth for the roof type {self.name}, got {theta_p['teeth']}; choose "
-            "one of these"
-        )
+        matching = [variant for variant in self.variants if set(variant.parameters) <= set(theta_p)]
+        return max(matching, key=lambda variant: len(variant.parameters), default=self)
 
     def vertices(self, theta_p: Mapping[str, float]) -> np.ndarray:
         """Return vertices (n, 3), S = f(theta_p); raises FitError where a parameter is missing."""

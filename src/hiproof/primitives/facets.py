@@ -7,10 +7,10 @@ and volumes hold. Stretched in one axis, it is an ellipse.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,20 +28,37 @@ NUMERICAL_ZERO = 1e-12  # A smaller share is none.
 
 
 def with_facets(
-    make: Callable[[int], Primitive], side_counts: tuple[int, ...] = SIDE_COUNTS, **changes: Any
+    make: Callable[..., Primitive],
+    measure: Callable[[Mapping[str, float]], float] = lambda p: p["length"],
+    side_counts: tuple[int, ...] = SIDE_COUNTS,
+    chords: int = 0,
+    rise: str = "",
 ) -> Primitive:
-    """Return a round shape with variants by number of sides, of which the first is fitted."""
-    first, *rest = map(make, side_counts)
-    return replace(first, more=tuple(replace(shape, starts=()) for shape in rest), **changes)
+    """Return a round shape with variants by number of sides, of which the first is fitted.
 
+    It has as many sides as its diameter (m), by `measure`, asks for. A profile of so many `chords`
+    has them split as its `rise`, a parameter, asks for, up to MOST_FACETS facets in all.
 
-def count_sides(diameter: float, most: int = max(SIDE_COUNTS)) -> int:
-    """Return the place in SIDE_COUNTS of the fewest sides that keep CHORD_M.
-
-    >>> [SIDE_COUNTS[count_sides(x)] for x in (2.0, 8.0, 30.0, 400.0)]
+    >>> from .revolved import DOME
+    >>> [len(DOME.variant({"length": x}).rim) for x in (2.0, 8.0, 30.0, 400.0)]
     [8, 16, 32, 64]
     """
-    return SIDE_COUNTS.index(min(find_sides(diameter / 2, CHORD_M), most))
+    most = max(side_counts)
+
+    def refine(p: Mapping[str, float], chord_m: float) -> Primitive:
+        sides = find_sides(measure(p) / 2, chord_m)
+        if not chords:
+            return make(sides)
+        sides = min(sides, most)
+        return make(sides, find_splits(p[rise], chord_m, MOST_FACETS // sides // chords))
+
+    first, *rest = map(make, side_counts)
+    return replace(
+        first,
+        more=tuple(replace(shape, starts=()) for shape in rest),
+        choose=lambda p: side_counts.index(min(find_sides(measure(p) / 2, CHORD_M), most)),
+        refine=refine,
+    )
 
 
 def find_sides(radius: float, chord_m: float) -> int:
@@ -96,23 +113,20 @@ def make_facet_planes(sides: int, apothem: float, fall: Formula, top: Formula) -
 class ChordProfile(NamedTuple):
     """A profile in chords, as formulas of half the width V and of q.
 
-    `knots` (k,) are shares of the radius, and `heights` (k,) those above the eave there. Of every
-    chord between two of them, `chords` have the height at the axis and the fall from there to the
-    rim.
+    `knots` (k,) are shares of the radius, and `heights` (k,) those above the eave there.
     """
 
     knots: list[float]
     heights: list[Formula]
-    chords: list[tuple[Formula, Formula]]
 
-
-def join_knots(knots: list[float], heights: list[Formula]) -> ChordProfile:
-    """Return the profile of the chords between knots."""
-    chords = []
-    for (a, b), (z, z_next) in zip(pairwise(knots), pairwise(heights), strict=True):
-        fall = (z - z_next) * (1.0 / (b - a))
-        chords.append((z + fall * a, fall))
-    return ChordProfile(knots, heights, chords)
+    @property
+    def chords(self) -> list[tuple[Formula, Formula]]:
+        """The height at the axis and the fall from there to the rim of each chord."""
+        chords = []
+        for (a, b), (z, z_next) in zip(pairwise(self.knots), pairwise(self.heights), strict=True):
+            fall = (z - z_next) * (1.0 / (b - a))
+            chords.append((z + fall * a, fall))
+        return chords
 
 
 def draw_profile(around_axis: bool, splits: int = 1) -> ChordProfile:
@@ -134,7 +148,7 @@ def draw_profile(around_axis: bool, splits: int = 1) -> ChordProfile:
     circle = raise_knots(knots, lambda r: math.sqrt(1.0 - r * r), volumes[1], around_axis)
     cube = q1 * q1 * q1 * V
     heights = [(q1 * V - cube) * x + cube * y for x, y in zip(parabola, circle, strict=True)]
-    return join_knots(knots, heights)
+    return ChordProfile(knots, heights)
 
 
 def raise_knots(

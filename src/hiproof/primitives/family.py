@@ -365,19 +365,16 @@ class Member:
         """Return deviations of a part's parameters (`words`) and t_z by name."""
         parameters, kappa, translation = words
         shape = self.in_catalogue[0] if as_catalogue and self.in_catalogue is not None else None
-        quantities = {**parameters, "t_z": float(translation[2])}
-        squares = np.zeros((len(quantities), changes.eaves.shape[1]))
-        straight = {f"skew_{side}": 0.0 for side in SIDES}
+        informed = changes.eaves.shape[1] - untold
+        straight = {f"skew_{side}": np.zeros(informed + untold) for side in SIDES}
         changed = straight | changes.measure_as(shape, kappa)
-        for k, (name, value) in enumerate(quantities.items()):
-            squares[k] = (changed[name] - value) ** 2
-        informed = squares.shape[1] - untold
-        variances = squares[:, :informed].sum(axis=1).tolist()
-        unknown = squares[:, informed:].sum(axis=1).tolist()
-        each = zip(quantities, variances, unknown, strict=True)
-        return {
-            name: math.sqrt(v) for name, v, free in each if v > NEGLIGIBLE and not free > NEGLIGIBLE
-        }
+        deviations = {}
+        for name, value in {**parameters, "t_z": float(translation[2])}.items():
+            squares = (changed[name] - value) ** 2
+            variance = squares[:informed].sum()
+            if variance > NEGLIGIBLE and not squares[informed:].sum() > NEGLIGIBLE:
+                deviations[name] = math.sqrt(variance)
+        return deviations
 
 
 def degrees(rise: Any) -> Any:

@@ -17,16 +17,12 @@ import numpy as np
 from .algebra import Formula, V, q0, q1, q2
 from .contract import Corners, Plane, Primitive
 from .facets import (
-    MOST_FACETS,
     PROFILE_DEG,
     SIDE_COUNTS,
     ChordProfile,
-    count_sides,
     draw_profile,
     find_apothem,
-    find_sides,
     find_splits,
-    join_knots,
     make_facet_planes,
     make_rim,
     raise_knots,
@@ -67,12 +63,12 @@ def revolve(
 
 def list_ring_faces(sides: int, rings: int) -> tuple[tuple[int, ...], ...]:
     """Return the corners of every facet of so many rings."""
-    places = [(k, (k + 1) % sides) for k in range(sides)]
-    faces: list[tuple[int, ...]] = [(1 + k, 1 + after, 0) for k, after in places]
-    for ring in range(1, rings):
-        lower, upper = 1 + ring * sides, 1 + (ring - 1) * sides
-        faces += [(lower + k, lower + after, upper + after, upper + k) for k, after in places]
-    return tuple(faces)
+    first = np.arange(1, sides + 1)
+    pairs = np.column_stack([first, np.roll(first, -1)])
+    faces = [(*pair, 0) for pair in pairs.tolist()]
+    for start in range(sides, rings * sides, sides):
+        faces += np.hstack([pairs + start, pairs[:, ::-1] + start - sides]).tolist()
+    return tuple(map(tuple, faces))
 
 
 NECK = 0.4  # Share of the radius at which the bulge ends.
@@ -93,7 +89,7 @@ def draw_onion(splits: int = 1) -> ChordProfile:
     bend = raise_knots(top, lambda r: (1.0 - r / NECK) ** 2, NECK * NECK / 12.0, True)
     ellipse = raise_knots(bulge, lambda r: math.sqrt(1.0 - r * r), NECK_RISE**3 / 3.0, True)
     heights = [q1 * V * (LINE_TOP * (1.0 - r)) + q2 * V * z for r, z in zip(top, bend, strict=True)]
-    return join_knots([*top, *bulge[1:]], [*heights, *(q1 * V * z for z in ellipse[1:])])
+    return ChordProfile([*top, *bulge[1:]], [*heights, *(q1 * V * z for z in ellipse[1:])])
 
 
 @cache
@@ -110,23 +106,14 @@ def make_onion(sides: int, splits: int = 1) -> Primitive:
     )
 
 
-def refine_onion(p: Mapping[str, float], chord_m: float) -> Primitive:
-    """Return the onion with facets within a tolerance, at most MOST_FACETS."""
-    sides = min(find_sides(p["length"] / 2, chord_m), MOST_SIDES)
-    return make_onion(
-        sides, find_splits(p["neck_height"], chord_m, MOST_FACETS // sides // ALL_CHORDS)
-    )
-
-
 ONION = with_facets(
     make_onion,
-    tuple(sides for sides in SIDE_COUNTS if sides <= MOST_SIDES),
-    choose=lambda p: count_sides(p["length"], MOST_SIDES),
-    refine=refine_onion,
+    side_counts=tuple(sides for sides in SIDE_COUNTS if sides <= MOST_SIDES),
+    chords=ALL_CHORDS,
+    rise="neck_height",
 )
 
 
-CHORDS = len(PROFILE_DEG) - 1  # of half a profile
 MOST_SPLITS = 8  # Parts of each chord of a barrel.
 EAVE = q0 - q1 * V
 
@@ -168,13 +155,7 @@ def make_barrel(splits: int = 1) -> Primitive:
     return vault
 
 
-def refine_dome(p: Mapping[str, float], chord_m: float) -> Primitive:
-    """Return the dome with facets within a tolerance, at most MOST_FACETS."""
-    sides = min(find_sides(p["length"] / 2, chord_m), max(SIDE_COUNTS))
-    return make_dome(sides, find_splits(p["height"], chord_m, MOST_FACETS // sides // CHORDS))
-
-
-DOME = with_facets(make_dome, choose=lambda p: count_sides(p["length"]), refine=refine_dome)
+DOME = with_facets(make_dome, chords=len(PROFILE_DEG) - 1, rise="height")
 BARREL = replace(
     make_barrel(),
     refine=lambda p, chord_m: make_barrel(find_splits(p["height"], chord_m, MOST_SPLITS)),
