@@ -171,7 +171,7 @@ def describe_solids(path: Path, head: FileHead, damaged: Damaged) -> Iterator[Sh
 
 
 def read_solid_models(path: Path, head: FileHead, damaged: Damaged) -> Iterator[BuildingModel]:
-    units = find_units(head.crs) if head.crs is not None else head.units.cityjson
+    units = find_units(head.crs)
     if path.suffix.lower() in CITYGML_SUFFIXES:
         solids = read_building_solids(path, damaged, units)
         return (BuildingModel(id, {}, solid) for id, solid in solids)

@@ -246,18 +246,13 @@ def overridden(
             result = fit_within(override, *arguments, neighbours)
     except HiproofError as error:
         result = dataclasses.replace(building, status=Status.NOT_BUILT, detail=str(error))
-    if lies_under(result, override.z_ground):
-        result = add_remark(result, "the ground given lies above its lowest eave")
+    z_ground = override.z_ground
+    if z_ground is not None and result.built is not None:
+        if result.solid.vertices[:, 2].min() < z_ground - 1e-3:
+            result = add_remark(result, "the ground given lies above its lowest eave")
     result = add_overhangs(result, points, neighbours, settings)
-    result = add_remark(result, remark_given_ground(result, override.z_ground, terrain))
+    result = add_remark(result, remark_given_ground(result, z_ground, terrain))
     return add_remark(result, override.told)
-
-
-def lies_under(building: Building, z_ground: float | None) -> bool:
-    """Return whether the given ground lies above the walls' lower end."""
-    if z_ground is None or building.built is None:
-        return False
-    return bool(building.solid.vertices[:, 2].min() < z_ground - 1e-3)
 
 
 def remark_given_ground(building: Building, z_ground: float | None, terrain: Any) -> str:

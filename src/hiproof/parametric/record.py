@@ -41,6 +41,8 @@ FARTHEST_WORLD_M = 1e8
 LARGEST_NUMBER = 1e15  # at which float64 still holds eighths; larger is no number of a building
 FAR_M, SLACK_M = 1e4, 0.01  # how far a saw-tooth's outline may reach into the next tooth
 FIGURES = tuple(field.name for field in fields(Quality) if field.name != "points")
+# Values that a building has as they are read.
+KEPT = "ground_source", "objective", "recognised", "types", "shift", "change", "survey_date"
 # The values of each type that has a few of them, and what a sentence calls one.
 CHOICES: dict[str, tuple[str, Collection[str]]] = {
     "unit": ("a unit", NAMED_UNITS),
@@ -126,22 +128,16 @@ def make_building(values: Mapping[str, Any]) -> tuple[Building, Roof | None]:
         status=status,
         detail=values.get("detail", "") if status.code == values.get("status") else "",
         quality=Quality(
-            points=int(values.get("points", 0)),
-            **{name: figures.get(name, math.nan) for name in FIGURES},
+            int(values.get("points", 0)),
+            **{name: figures[name] for name in FIGURES if name in figures},
         ),
         grade=grades.get(values.get("quality", "")),
         z_ground=round_number(ground, PLAN_DIGITS),
-        ground_source=values.get("ground_source", ""),
         terrain_intersection=tuple(values.get("terrain_line", ())),
-        objective=values.get("objective", math.nan),
-        recognised=values.get("recognised", {}),
-        types=values.get("types", {}),
         footprint=outline if roof is None else roof.world_outline,
         attributes=dict(values.get("attributes", {})),
-        shift=values.get("shift", (0.0, 0.0)),
-        change=values.get("change"),
-        survey_date=values.get("survey_date", ""),
         epochs_used=tuple(values.get("epochs_used", ())),
+        **{name: values[name] for name in KEPT if name in values},
     )
     return building, roof
 

@@ -190,26 +190,23 @@ def hiproof_attributes(
 ) -> dict[str, Any]:
     """Return our own attributes, without prefix."""
     quality, kind = building.quality, building.type
-    probability = building.types.get(kind) if kind else None
-    recognised = max(building.recognised, key=building.recognised.__getitem__, default=None)
-    heights = measure_terrain(building.terrain_intersection)
+    recognised = max(building.recognised, key=building.recognised.__getitem__, default="")
+    heights = measure_terrain(building.terrain_intersection) or (math.nan,) * 3
     names = ("ground_low", "ground_high", "ground_mean")
     return {
         "status": building.status.code,
         "quality": None if building.grade is None else building.grade.code,
         "detail": building.detail or building.status.value,
         "roof_type": kind,
-        "roof_type_probability": None if probability is None else round_number(probability),
-        "network_type": recognised,
-        "network_type_probability": None
-        if recognised is None
-        else round_number(building.recognised[recognised]),
+        "roof_type_probability": round_number(building.types.get(kind or "", math.nan)),
+        "network_type": recognised or None,
+        "network_type_probability": round_number(building.recognised.get(recognised, math.nan)),
         "h_eave": None if figures is None else metres(figures.h_eave),
         "parts": len(building.parts),
         "points": int(quality.points),
         **{name: round_number(getattr(quality, name)) for name in QUALITY_FIGURES},
         "ground_source": building.ground_source or None,
-        **dict(zip(names, [None] * 3 if heights is None else map(metres, heights), strict=True)),
+        **dict(zip(names, map(metres, heights), strict=True)),
         "shift_x": round_number(building.shift[0]),
         "shift_y": round_number(building.shift[1]),
         "iso19107_lod22": None

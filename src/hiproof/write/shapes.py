@@ -54,9 +54,6 @@ class Shapes:
         return np.column_stack([solid.vertices[:, :2], np.full(len(solid.vertices), self.z_edge)])
 
 
-NO_SHAPES = Shapes()
-
-
 def make_shapes(
     building: Building, figures: RoofFigures | None, write: WriteSettings, prefix: str = PREFIX
 ) -> Shapes:
@@ -67,12 +64,16 @@ def make_shapes(
         or figures is None
         or (lods <= {"2.2", "2.3"} and write.parts_as == "one")
     ):
-        return NO_SHAPES
+        return Shapes()
+    from ..compose.blocks import block
+
     solid = building.model.on_one_level
     ground = solid.select_faces(GROUND)[0]
     cut = cut_into_parts(building) if write.parts_as == "buildingparts" or "1.3" in lods else ()
     parts = part_shapes(building, cut, lods, prefix) if write.parts_as == "buildingparts" else ()
-    lod12 = whole_block(solid, ground, figures) if lods & {"1.2", "1.3"} else None
+    lod12 = None
+    if lods & {"1.2", "1.3"}:  # as high as 7/10 of the roof lie below, as in 3DBAG
+        lod12 = block(solid.project_face(ground), figures.h_base, metres(figures.h_70p))
     return Shapes(
         outline=ground if "0" in lods else None,
         z_edge=metres(figures.h_eave),
@@ -99,13 +100,6 @@ def cut_into_parts(building: Building) -> tuple[BuildingPart, ...]:
         )
     except CompositionError:
         return ()
-
-
-def whole_block(solid: Solid, ground: Face, figures: RoofFigures) -> Solid:
-    """Return LoD1.2: a block as high as 7/10 of the roof lie below (as in 3DBAG)."""
-    from ..compose.blocks import block
-
-    return block(solid.project_face(ground), figures.h_base, metres(figures.h_70p))
 
 
 def make_stepped_block(cut: tuple[BuildingPart, ...], figures: RoofFigures) -> Solid | None:

@@ -55,16 +55,9 @@ def roof_type_code(types: Iterable[str], code_list: str = "sig3d") -> str:
     ...     "hip"]), roof_type_code(["hip"], "adv")
     ('1030', '1130', '3200')
     """
-    codes = {find_code(name, code_list) for name in types}
+    field = "citygml_code" if code_list == "sig3d" else "adv_code"
+    codes = {getattr(CATALOGUE.get(name), field, MIXED[code_list]) for name in types}
     return codes.pop() if len(codes) == 1 else MIXED[code_list]
-
-
-def find_code(name: str, code_list: str) -> str:
-    """Return the code of one roof type."""
-    if name not in CATALOGUE:
-        return MIXED[code_list]
-    shape = CATALOGUE[name]
-    return shape.citygml_code if code_list == "sig3d" else shape.adv_code
 
 
 NAMESPACES = {

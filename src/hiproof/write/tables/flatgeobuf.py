@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from .geopackage import BUILDINGS, AttributesWriter
-from .vector_layer import column_names, translate_write_errors, write_layer
+from .vector_layer import name_columns, translate_write_errors, write_layer
 
 
 class FlatGeobufWriter(AttributesWriter):
@@ -17,13 +17,13 @@ class FlatGeobufWriter(AttributesWriter):
     def finish(self) -> None:
         (waiting,) = self.waiting.values()
         kinds = waiting.kinds(self.head.prefix)
-        rows = [row for batch in waiting.batches() for row in batch if row[0]]
+        rows = [row for batch in waiting.batches(kinds) for row in batch if row[0]]
         with translate_write_errors(self.path):
             write_layer(
                 self.hidden,
                 BUILDINGS,
-                dict(zip(column_names(kinds), kinds.values(), strict=True)),
-                [[values.get(name) for name in kinds] for _, values in rows],
+                name_columns(kinds.items()),
+                [values for _, values in rows],
                 [wkb for wkb, _ in rows],
                 driver="FlatGeobuf",
                 geometry_type="MultiPolygon",

@@ -25,7 +25,7 @@ from .vector_layer import (
     GEOPACKAGE,
     HISTORY,
     WaitingRows,
-    column_names,
+    name_columns,
     translate_write_errors,
     write_layer,
 )
@@ -97,15 +97,12 @@ class AttributesWriter(BuildingWriter):
         with translate_write_errors(self.path):
             for waiting in (w for w in self.waiting.values() if w.is_needed):
                 kinds = columns[waiting.layer] = waiting.kinds(self.head.prefix, MOST_COLUMNS)
-                names = column_names(kinds, self.reserved)
-                typed_names = dict(zip(names, kinds.values(), strict=True))
-                for number, rows in enumerate(waiting.batches()):
-                    values = [[row.get(name) for name in kinds] for _, row in rows]
+                for number, rows in enumerate(waiting.batches(kinds)):
                     write_layer(
                         self.hidden,
                         waiting.layer,
-                        typed_names,
-                        values,
+                        name_columns(kinds.items(), self.reserved),
+                        [values for _, values in rows],
                         [wkb for wkb, _ in rows],
                         crs=self.plan_wkt,
                         append=number > 0,

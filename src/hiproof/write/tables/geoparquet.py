@@ -9,8 +9,7 @@ from typing import Any
 from ...read.outlines.geoparquet import import_pyarrow
 from ..head import FileHead
 from .geopackage import BUILDINGS, AttributesWriter
-from .rows import Row
-from .vector_layer import column_names
+from .vector_layer import name_columns
 
 GEOMETRY = "geometry"
 PLAN_TYPES = ["Polygon", "MultiPolygon"]
@@ -34,10 +33,10 @@ class GeoParquetWriter(AttributesWriter):
         kinds = waiting.kinds(self.head.prefix)
         schema = self.schema(kinds)
         with pyarrow.parquet.ParquetWriter(self.hidden, schema, compression="zstd") as file:
-            for rows in waiting.batches():
-                file.write_table(
-                    pyarrow.Table.from_arrays(arrays(rows, kinds, schema), schema=schema)
-                )
+            for rows in waiting.batches(kinds):
+                columns = zip(*([*values, wkb] for wkb, values in rows), strict=True)
+                values = [list(column) for column in columns] or [[] for _ in schema]
+                file.write_table(pyarrow.table(values, schema=schema))
 
     def schema(self, kinds: dict[str, type]) -> Any:
         """Return Arrow's schema of `kinds` and the geometry, which GeoParquet describes."""
@@ -50,11 +49,8 @@ class GeoParquetWriter(AttributesWriter):
             float: pyarrow.float64(),
             str: pyarrow.string(),
         }
-        names = column_names(kinds, self.reserved)
-        fields = [
-            pyarrow.field(name, types[kind])
-            for name, kind in zip(names, kinds.values(), strict=True)
-        ]
+        columns = name_columns(kinds.items(), self.reserved)
+        fields = [pyarrow.field(name, types[kind]) for name, kind in columns.items()]
         crs = None if self.plan_wkt is None else CRS.from_wkt(self.plan_wkt).to_json_dict()
         geometry = {"encoding": "WKB", "geometry_types": GEOMETRY_TYPES[self.layers[0]], "crs": crs}
         geo = {"version": "1.0.0", "primary_column": GEOMETRY, "columns": {GEOMETRY: geometry}}
@@ -64,14 +60,3 @@ class GeoParquetWriter(AttributesWriter):
 
 
 writer = GeoParquetWriter
-
-
-def arrays(rows: list[Row], kinds: dict[str, type], schema: Any) -> list:
-    """Return Arrow arrays of `rows`, the outlines last."""
-    import pyarrow
-
-    columns = [
-        pyarrow.array([None if (v := row.get(name)) is None else kind(v) for _, row in rows], type)
-        for (name, kind), type in zip(kinds.items(), schema.types, strict=False)
-    ]
-    return [*columns, pyarrow.array([outline for outline, _ in rows], schema.types[-1])]

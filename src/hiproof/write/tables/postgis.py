@@ -32,7 +32,7 @@ from ..fragments import Sheet
 from ..meshes.triangles import faces_triangles
 from ..values import plain_text
 from .rows import Rows, split_lines, table_rows
-from .vector_layer import HISTORY, WaitingRows, column_kind, column_names
+from .vector_layer import HISTORY, WaitingRows, column_kind, name_columns
 
 # first half of the keys of our advisory locks ("hi"); the second is the prefix's, 0 for the
 # extension
@@ -195,9 +195,11 @@ class Loading:
         """Make the table or the columns that it lacks, and replace this run's rows in it."""
         kinds = rows.kinds(PREFIX)
         # room for a number within PostgreSQL's limit
-        cut = (name.encode()[: MOST_NAME_BYTES - 4].decode(errors="ignore") for name in kinds)
-        names = column_names([name or "column" for name in cut], OWN_COLUMNS)
-        columns = dict(zip(names, kinds.values(), strict=True))
+        cut = (
+            (name.encode()[: MOST_NAME_BYTES - 4].decode(errors="ignore") or "column", kind)
+            for name, kind in kinds.items()
+        )
+        columns = name_columns(cut, OWN_COLUMNS)
         if self.table_exists(table.ending):
             columns = self.widen_table(table, columns)
         else:
@@ -276,14 +278,10 @@ class Loading:
         """Send rows, `kinds` their values by name, to the table's `columns` in that order."""
         names = ", ".join(map(quote, ("run", *columns, "geom")))
         with self.cursor.copy(f"copy {self.name(table.ending)} ({names}) from stdin") as copy:
-            for batch in rows.batches():
+            for batch in rows.batches(dict(zip(kinds, columns.values(), strict=True))):
                 for wkb, values in batch:
-                    sent = [
-                        None if (value := values.get(name)) is None else kind(value)
-                        for name, kind in zip(kinds, columns.values(), strict=True)
-                    ]
                     place = None if wkb is None else encode_place(wkb, self.run.srid)
-                    copy.write_row((self.run.name, *sent, place))
+                    copy.write_row((self.run.name, *values, place))
 
     def note_run(self) -> None:
         """Say in PREFIX_runs which run the tables hold now."""

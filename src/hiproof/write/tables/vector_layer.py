@@ -17,7 +17,6 @@ import numpy as np
 
 from ...errors import OutputError
 from ..attribute_list import OWN, TABLES
-from .rows import Row
 
 CONFIGURATION = {
     # a GeoPackage notes when a table last changed; the same input gives the same file
@@ -36,8 +35,8 @@ def write_layer(
     path: str | os.PathLike[str],
     layer: str,
     columns: Mapping[str, type],
-    rows: Sequence[Sequence[Any]],
-    wkb: Sequence[bytes | None] | None = None,
+    rows: Iterable[Sequence[Any]],
+    wkb: Iterable[bytes | None] | None = None,
     **options: Any,
 ) -> None:
     """Write or append `rows`, values by column, with their geometries as WKB.
@@ -53,7 +52,7 @@ def write_layer(
         warnings.simplefilter("ignore")  # on a file's hidden name, and on an unknown CRS
         pyogrio.raw.write(
             os.fspath(path),
-            None if wkb is None else make_objects(wkb),
+            None if wkb is None else make_objects([*wkb]),
             [column for column, _ in data],
             list(columns),
             [mask for _, mask in data],
@@ -139,11 +138,17 @@ class WaitingRows:
             kinds = {name: kind for name, kind in kinds.items() if name not in left_out}
         return kinds or {"id": str}
 
-    def batches(self) -> Iterator[list[Row]]:
-        """Yield the rows, some thousands at a time, or one empty batch."""
+    def batches(self, kinds: Mapping[str, type]) -> Iterator[list[tuple[bytes | None, list[Any]]]]:
+        """Yield geometries and values of columns, some thousand rows at a time, or none at once."""
         self.file.seek(0)
         rows = (
-            (wkb and bytes.fromhex(wkb), values)
+            (
+                wkb and bytes.fromhex(wkb),
+                [
+                    None if (value := values.get(name)) is None else kind(value)
+                    for name, kind in kinds.items()
+                ],
+            )
             for line in self.file
             for wkb, values in json.loads(line)
         )
@@ -162,20 +167,22 @@ def column_kind(result: set[type], declared: str) -> type:
     return str if str in kinds else float if float in kinds else int
 
 
-def column_names(names: Iterable[str], reserved: Iterable[str] = ()) -> list[str]:
-    """Return names that SQLite can hold beside the `reserved` ones.
+def name_columns(
+    kinds: Iterable[tuple[str, type]], reserved: Iterable[str] = ()
+) -> dict[str, type]:
+    """Return types of columns by names that SQLite can hold beside the `reserved` ones.
 
     SQLite does not tell upper from lower case.
 
-    >>> column_names(["id", "Year", "year", "fid"], ["fid"])
+    >>> list(name_columns([("id", str), ("Year", int), ("year", int), ("fid", int)], ["fid"]))
     ['id', 'Year', 'year_2', 'fid_2']
     """
-    accepted, unique = set(reserved), []
-    for name in names:
+    accepted, columns = set(reserved), {}
+    for name, kind in kinds:
         candidate, number = name, 1
         while candidate.lower() in accepted:
             number += 1
             candidate = f"{name}_{number}"
         accepted.add(candidate.lower())
-        unique.append(candidate)
-    return unique
+        columns[candidate] = kind
+    return columns

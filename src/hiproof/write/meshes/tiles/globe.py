@@ -73,7 +73,9 @@ class Globe:
             )
         units = find_units(crs, "the models")
         to_centre = Transformer.from_crs(GEOGRAPHIC_CRS, GEOCENTRIC_CRS, always_xy=True)
-        exact = with_heights(crs) if geoid_height_m is None else None
+        exact = None  # where the way to heights would be a guess
+        if geoid_height_m is None and has_heights(crs):
+            exact = find_best_transformer(crs, GEOGRAPHIC_CRS, allow_ballpark=False)
         transformer = exact or find_best_transformer(horizontal_crs(crs), "EPSG:4326")
         if transformer is None:
             raise InputError(
@@ -126,12 +128,6 @@ class Globe:
             return self.units.to_metres(np.column_stack(coordinates))
         xy = np.column_stack(self.transformer.transform(longitude, latitude, direction="INVERSE"))
         return np.column_stack([self.units.to_metres(xy), height - self.geoid_height_m])
-
-
-def with_heights(crs: Any) -> Any:
-    """Return the transformer of plan and heights, None where it would be a guess."""
-    known = has_heights(crs)
-    return find_best_transformer(crs, GEOGRAPHIC_CRS, allow_ballpark=False) if known else None
 
 
 def explain_heights(crs: Any, exact: Any, geoid_height_m: float | None) -> tuple[str, bool]:

@@ -152,19 +152,14 @@ class TileFiles:
             "refine": "ADD",
         }
         if len(tile.items):
-            description["content"] = {
-                "uri": self.name_file(tile),
-                "boundingVolume": bound_boxes(self.boxes[tile.items]),
-            }
+            rows, meshes = zip(*map(self.city.at, tile.items), strict=True)
+            uri = f"tiles/{tile.name}.glb"
+            (self.folder / uri).write_bytes(tile_glb(meshes, rows, self.properties))
+            box = bound_boxes(self.boxes[tile.items])
+            description["content"] = {"uri": uri, "boundingVolume": box}
         if tile.children:
             description["children"] = [self.write_tile(child) for child in tile.children]
         return description
-
-    def name_file(self, tile: Tile) -> str:
-        rows, meshes = zip(*map(self.city.at, tile.items), strict=True)
-        uri = f"tiles/{tile.name}.glb"
-        (self.folder / uri).write_bytes(tile_glb(meshes, rows, self.properties))
-        return uri
 
 
 def frame_at(origin: np.ndarray, globe: Globe | None) -> np.ndarray:
