@@ -6,6 +6,7 @@ import errno
 import json
 import re
 import shutil
+from functools import partial
 
 import laspy
 import numpy as np
@@ -29,24 +30,33 @@ NO_CLASS = 1
 SECRET = "J. Smith, 5 Mill Lane"
 
 
+def set_failing(patch, *ids):
+    """Let the fit of some buildings fail, with the sum of their points in the message."""
+
+    def failing(points, footprint, terrain, settings, id, ground, unused, neighbours):
+        if id in ids:
+            corner = np.array([footprint.polygon.bounds[:2]]) if footprint else points[:1, :2]
+            raise KeyError(
+                f"{len(points)} points, {points.sum():.9f}, {terrain.height_at(corner)[0]:.9f}"
+            )
+        return reconstruct(points, footprint, terrain, settings, id, ground, unused)
+
+    patch.setattr(solve, "reconstruct", failing)
+
+
 @pytest.fixture
 def set_failing_ids(monkeypatch):
-    """A function that lets the fit of some buildings fail, with the sum of their points in the
-    message.
-    """
+    return partial(set_failing, monkeypatch)
 
-    def set_failing(*ids):
-        def failing(points, footprint, terrain, settings, id, ground, unused, neighbours):
-            if id in ids:
-                corner = np.array([footprint.polygon.bounds[:2]]) if footprint else points[:1, :2]
-                raise KeyError(
-                    f"{len(points)} points, {points.sum():.9f}, {terrain.height_at(corner)[0]:.9f}"
-                )
-            return reconstruct(points, footprint, terrain, settings, id, ground, unused)
 
-        monkeypatch.setattr(solve, "reconstruct", failing)
-
-    return set_failing
+@pytest.fixture(scope="module")
+def failed_run(town_files, tmp_path_factory):
+    """The folder of a run whose first building failed; do not write into it."""
+    out = tmp_path_factory.mktemp("failed")
+    with pytest.MonkeyPatch.context() as patch:
+        set_failing(patch, "house-0")
+        reconstruct_area(Request((town_files[0],), out, town_files[1]))
+    return out
 
 
 def read_solved_rows(out):
@@ -214,18 +224,16 @@ def test_bundles_go_with_the_failure_and_leave_other_files_alone(tmp_path, set_f
     "error", [OSError(errno.ENOSPC, "No space left on device"), ValueError("odd"), MemoryError()]
 )
 def test_a_bundle_that_cannot_be_written_ends_no_run(
-    error, town_files, tmp_path, set_failing_ids, monkeypatch, caplog
+    error, town_files, failed_run, tmp_path, set_failing_ids, monkeypatch, caplog
 ):
     def refuse(*_):
         raise error
 
     set_failing_ids("house-0")
-    request = Request((town_files[0],), tmp_path / "kept", town_files[1])
-    reconstruct_area(request)
     monkeypatch.setattr(bundles, "write_outline", refuse)
     summary = reconstruct_area(Request((town_files[0],), tmp_path / "full", town_files[1]))
     assert summary.by_status == {"modelled": 3, "internal_error": 1}
-    assert records(tmp_path / "full") == records(tmp_path / "kept")
+    assert records(tmp_path / "full") == records(failed_run)
     assert not (tmp_path / "full" / "failures").exists()
     assert "the input of building house-0 could not be kept" in caplog.text
 
@@ -244,10 +252,9 @@ def test_the_traceback_is_in_the_log(town_files, tmp_path, set_failing_ids, capl
 @pytest.mark.parametrize(
     "damage", ["no folder", "no points", "cut off", "no outline", "no settings", "other JSON"]
 )
-def test_a_damaged_bundle_is_refused_in_one_sentence(damage, town_files, tmp_path, set_failing_ids):
-    set_failing_ids("house-0")
-    reconstruct_area(Request((town_files[0],), tmp_path / "out", town_files[1]))
-    (bundle,) = bundles.bundles_in(tmp_path / "out")
+def test_a_damaged_bundle_is_refused_in_one_sentence(damage, failed_run, tmp_path):
+    (whole,) = bundles.bundles_in(failed_run)
+    bundle = shutil.copytree(whole, tmp_path / "bundle")
     if damage == "no folder":
         shutil.rmtree(bundle)
     elif damage == "cut off":

@@ -17,11 +17,11 @@ from tiny_town import make_town, write_town
 pytest.importorskip("aiohttp", reason="needs fsspec[http], part of the extra `city`")
 
 
-@pytest.fixture
-def server(tmp_path):
+@pytest.fixture(scope="module")
+def server(tmp_path_factory):
     """A folder, its address, and the file that lists the ranges asked for."""
-    folder, log = tmp_path / "served", tmp_path / "ranges"
-    folder.mkdir()
+    folder = tmp_path_factory.mktemp("served")
+    log = folder.with_name("ranges")
     log.touch()
     with serve(folder, log) as address:
         yield folder, address, log

@@ -65,11 +65,6 @@ def test_examples_run(example, tmp_path, monkeypatch, capsys):
     assert capsys.readouterr().out.strip()
 
 
-def test_the_example_of_a_new_primitive_runs():
-    """In a process of its own, where the shape stays in the catalogue."""
-    assert run_python((ROOT / "examples/new_primitive.py").read_text(encoding="utf-8")).strip()
-
-
 def test_the_notebook_runs_and_is_stored_with_its_outputs():
     """Its cells run in order, and each gives outputs of the kinds that are stored with it."""
     pytest.importorskip("matplotlib", reason="the notebook plots (extra `report`)").use("Agg")

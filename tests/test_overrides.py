@@ -318,13 +318,6 @@ def columns_request(town_files, tmp_path, pair):
     return hiproof.Request((town_files[0],), tmp_path / "out", str(path), settings=settings)
 
 
-def test_columns_of_the_footprints_override_too(town_files, tmp_path):
-    city_run.reconstruct_area(columns_request(town_files, tmp_path, "daktype=type"))
-    rows = by_id(tmp_path / "out")
-    assert rows["house-0"]["type"] == "hip" and "overridden: type hip" in rows["house-0"]["detail"]
-    assert "overridden" not in rows["house-1"]["detail"]
-
-
 def columns_run(folder, key, values, town):
     """What a run writes, by id, of a town whose footprints have a column that holds `values` of the
     override's `key`.
@@ -397,7 +390,8 @@ def test_where_a_file_says_something_else_than_columns_the_file_counts(
 ):
     (tmp_path / "o.jsonl").write_text(json.dumps({"id": "house-0", "type": "", **overrides}))
     request = columns_request(town_files, tmp_path, "daktype=type")
-    city_run.reconstruct_area(dataclasses.replace(request, overrides=str(tmp_path / "o.jsonl")))
+    given = {"overrides": str(tmp_path / "o.jsonl"), "where": "daktype = 'hip'"}
+    city_run.reconstruct_area(dataclasses.replace(request, **given))
     house = by_id(tmp_path / "out")["house-0"]
     assert (
         house["type"] != "hip"
@@ -406,22 +400,22 @@ def test_where_a_file_says_something_else_than_columns_the_file_counts(
     )
 
 
-@pytest.mark.parametrize(
-    ("pair", "message"),
-    [
-        ("roof=type", r"columns of the footprints \(.*daktype.*\) .*got 'roof'"),
-        ("daktype=tipe", "keys of an override .*got 'tipe'"),
-        ("daktype", "keys of an override .*got ''"),
-    ],
-)
-def test_columns_that_are_not_there_are_refused_and_hold_the_folder_not(
-    pair, message, town_files, tmp_path
-):
-    with pytest.raises(InputError, match=message):
-        city_run.reconstruct_area(columns_request(town_files, tmp_path, pair))
-    (tmp_path / "footprints.gpkg").unlink()
+WRONG_PAIRS = {
+    "roof=type": r"columns of the footprints \(.*daktype.*\) .*got 'roof'",
+    "daktype=tipe": "keys of an override .*got 'tipe'",
+    "daktype": "keys of an override .*got ''",
+}
+
+
+def test_columns_override_too_and_others_are_refused_and_hold_the_folder_not(town_files, tmp_path):
+    for pair, message in WRONG_PAIRS.items():
+        with pytest.raises(InputError, match=message):
+            city_run.reconstruct_area(columns_request(town_files, tmp_path, pair))
+        (tmp_path / "footprints.gpkg").unlink()
     city_run.reconstruct_area(columns_request(town_files, tmp_path, "daktype=type"))
-    assert by_id(tmp_path / "out")["house-0"]["type"] == "hip"
+    rows = by_id(tmp_path / "out")
+    assert rows["house-0"]["type"] == "hip" and "overridden: type hip" in rows["house-0"]["detail"]
+    assert "overridden" not in rows["house-1"]["detail"]
 
 
 def test_a_table_of_typed_columns_says_what_it_says_where_rows_leave_gaps(tmp_path):

@@ -20,7 +20,7 @@ from hiproof.settings import Settings
 from programs import run_hiproof
 from range_server import serve
 from run_records import records
-from tiny_town import CRS, make_town, write_cloud, write_town
+from tiny_town import CRS, make_town, write_cloud
 
 pyarrow = pytest.importorskip("pyarrow.parquet", reason="the extra `parquet` is not installed")
 pytest.importorskip("aiohttp", reason="needs fsspec[http], part of the extra `parquet`")
@@ -71,27 +71,28 @@ def first_byte(metadata, group):
     return min(c.dictionary_page_offset or c.data_page_offset for c in columns)
 
 
-@pytest.fixture
-def served_release(tmp_path, monkeypatch, quick_tiles):
-    """A folder with the cloud of the town, settings that name the release's catalogue, and the file
-    that lists the ranges asked for.
-    """
-    # solved without compiled code
-    monkeypatch.setattr("hiproof.city.work.executors.InProcess.prepare", lambda executor: None)
-    folder, log = tmp_path / "served", tmp_path / "ranges"
-    folder.mkdir()
-    log.touch()
+@pytest.fixture(scope="module")
+def release(tmp_path_factory):
+    """A served folder, its catalogue's address, and the file that lists the ranges asked for."""
+    folder = tmp_path_factory.mktemp("served")
+    log = folder.with_name("ranges")
     nearby, odd, distant = town_rows()
     with serve(folder, log) as address:
         # the far ones of the first file stand in row groups of their own
         parts = [building("gers-part", nearby[0]["outline"], building_id="gers-house-0")]
         files = {"building": [nearby + distant[:20], odd + distant[20:30], distant[30:]]}
-        catalogue = write_release(folder, address, files | {"building_part": [parts]})
-        settings = Settings.from_dict(
-            {"read": {"overture_catalogue": catalogue}, "reconstruct": {"align": "off"}}
-        )
-        cloud, _ = write_town(tmp_path, TOWN)
-        yield cloud, settings, log
+        yield folder, write_release(folder, address, files | {"building_part": [parts]}), log
+
+
+@pytest.fixture
+def served_release(release, town_files, monkeypatch, quick_tiles):
+    """The cloud of the town, settings that name the release's catalogue, and an empty log."""
+    # solved without compiled code
+    monkeypatch.setattr("hiproof.city.work.executors.InProcess.prepare", lambda executor: None)
+    _, catalogue, log = release
+    log.write_text("")
+    read = {"read": {"overture_catalogue": catalogue}, "reconstruct": {"align": "off"}}
+    return town_files[0], Settings.from_dict(read), log
 
 
 def test_a_run_takes_the_buildings_of_the_clouds_extent(served_release, tmp_path):
@@ -118,14 +119,16 @@ def test_a_run_takes_the_buildings_of_the_clouds_extent(served_release, tmp_path
     ]
 
 
-def test_a_finished_run_asks_for_no_network(served_release, tmp_path):
+def test_a_finished_run_asks_for_no_network(release, served_release, tmp_path):
     cloud, settings, _ = served_release
     request = Request((str(cloud),), tmp_path / "out", "overture", settings=settings)
     first = reconstruct_area(request)
-    (tmp_path / "served" / "catalog.json").unlink()
+    catalogue = release[0] / "catalog.json"
+    catalogue.rename(hidden := catalogue.with_suffix(".hidden"))
     assert reconstruct_area(request).by_status == first.by_status
     with pytest.raises(InputError, match="expected a STAC catalogue"):
         reconstruct_area(dataclasses.replace(request, restart=True))
+    hidden.rename(catalogue)
 
 
 def test_settings_beside_are_not_looked_for_where_overture_is(
@@ -159,7 +162,7 @@ def test_a_kept_file_gives_the_same_models(served_release, tmp_path, capsys):
     assert notes[0]["footprints_source"] == notes[1]["footprints_source"]
 
 
-def test_only_the_row_groups_that_meet_the_extent_are_fetched(served_release, tmp_path):
+def test_only_the_row_groups_that_meet_the_extent_are_fetched(release, served_release, tmp_path):
     cloud, settings, log = served_release
     config = tmp_path / "settings.toml"
     config.write_text(settings.to_toml())
@@ -170,8 +173,8 @@ def test_only_the_row_groups_that_meet_the_extent_are_fetched(served_release, tm
         request.setdefault(path.lstrip("/"), []).append((int(start), int(stop)))
     assert sorted(path.rpartition("/")[2][:10] for path in request) == ["part-00000", "part-00001"]
     for path, ranges in request.items():
-        metadata = pyarrow.ParquetFile(tmp_path / "served" / path).metadata
-        size = (tmp_path / "served" / path).stat().st_size
+        metadata = pyarrow.ParquetFile(release[0] / path).metadata
+        size = (release[0] / path).stat().st_size
         assert metadata.num_row_groups > 2
         # the row group that holds the town with what is buffered, and the file's end
         assert all(

@@ -4,6 +4,7 @@ way.
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -30,30 +31,16 @@ from hiproof.settings import Settings
 from layers import write_layer
 from programs import run_hiproof
 from run_records import RECORDS, records
-from tiny_town import make_town, write_cloud, write_footprints, write_town
-
-
-@pytest.fixture(scope="module")
-def files(tmp_path_factory):
-    return write_town(tmp_path_factory.mktemp("town"))
-
-
-@pytest.fixture(scope="module")
-def finished_run(files, tmp_path_factory):
-    """An undisturbed run to compare with."""
-    out = tmp_path_factory.mktemp("finished")
-    cloud, footprints = files
-    return out, reconstruct_area(Request((str(cloud),), out, str(footprints)))
+from tiny_town import make_town, write_cloud, write_footprints
 
 
 def parameters(out):
     return read_parameters(out / "parameters.jsonl")
 
 
-def test_every_building_is_modelled_validly(finished_run):
-    out, summary = finished_run
-    assert summary.exit_code == 0
-    assert summary.by_status == {"modelled": 4}
+def test_every_building_is_modelled_validly(town_run):
+    out = town_run
+    assert {row["status"] for row in parameters(out)} == {"modelled"}
     solids = list(read_solids(out / "buildings.city.jsonl"))
     assert [id for id, _ in solids] == [f"house-{i}" for i in range(4)]
     assert all(check_solid(solid, planarity_m=0.01) == () for _, solid in solids)
@@ -61,16 +48,16 @@ def test_every_building_is_modelled_validly(finished_run):
     assert {p.name for p in out.iterdir()} == {*RECORDS, "buildings.gpkg", "run.json", ".hiproof"}
 
 
-def test_the_run_record_names_settings_version_inputs_and_counts(finished_run):
-    record = json.loads((finished_run[0] / "run.json").read_text())
+def test_the_run_record_names_settings_version_inputs_and_counts(town_run):
+    record = json.loads((town_run / "run.json").read_text())
     assert Settings.from_dict(record["settings"]) == Settings()
     assert record["summary"]["buildings"] == 4
     assert record["inputs"]["footprints"].endswith("footprints.geojson")
     assert set(record["seconds"]) == {"plan", "prepare", "sort", "solve", "merge"}
 
 
-def test_a_run_is_measured_against_the_footprints_that_it_read(files, tmp_path):
-    cloud, footprints = files
+def test_a_run_is_measured_against_the_footprints_that_it_read(town_files, tmp_path):
+    cloud, footprints = town_files
     _, _, geometry, _ = pyogrio.raw.read(footprints)
     # whose features are numbered 1 to 4, and called 4 to 1
     names, path = {"number": np.arange(4, 0, -1)}, tmp_path / "numbered.gpkg"
@@ -84,11 +71,13 @@ def test_a_run_is_measured_against_the_footprints_that_it_read(files, tmp_path):
     assert all(area.equals(of_id[m.id]) for m, area in zip(run.models, run.footprints, strict=True))
 
 
-def test_what_a_run_begun_anew_does_not_write_is_not_left_from_before(files, tmp_path):
+def test_what_a_run_begun_anew_does_not_write_is_not_left_from_before(
+    town_files, tmp_path, quick_tiles
+):
     def run(**settings):
         types_found = Settings.from_dict(settings)
         reconstruct_area(
-            Request((str(files[0]),), tmp_path, str(files[1]), settings=types_found, restart=True)
+            Request((town_files[0],), tmp_path, town_files[1], settings=types_found, restart=True)
         )
 
     run(write={"citygml": "both"})
@@ -101,8 +90,8 @@ def test_what_a_run_begun_anew_does_not_write_is_not_left_from_before(files, tmp
         evaluate_run(tmp_path)
 
 
-def test_the_demo_replaces_itself_and_nobody_elses_run(files, tmp_path, quick_tiles):
-    reconstruct_area(Request((str(files[0]),), tmp_path / "own", str(files[1])))
+def test_the_demo_replaces_itself_and_nobody_elses_run(town_files, tmp_path, quick_tiles):
+    reconstruct_area(Request((town_files[0],), tmp_path / "own", town_files[1]))
     old_records = records(tmp_path / "own")
     refused = CliRunner().invoke(app, ["demo", "--out", str(tmp_path / "own")])
     assert (
@@ -114,9 +103,9 @@ def test_the_demo_replaces_itself_and_nobody_elses_run(files, tmp_path, quick_ti
 
 
 def test_what_is_written_is_asked_for_in_the_same_words_of_a_run_and_of_its_parameters(
-    files, tmp_path
+    town_files, tmp_path
 ):
-    cloud, footprints = map(str, files)
+    cloud, footprints = town_files
     request = ["--citygml", "both", "--osm-tags", "--lods", "0,2.2"]
     run = CliRunner().invoke(
         app,
@@ -147,25 +136,24 @@ def test_what_is_written_is_asked_for_in_the_same_words_of_a_run_and_of_its_para
     )
 
 
-def test_heights_are_the_towns(finished_run):
+def test_heights_are_the_towns(town_run):
     heights = {
-        id: solid.vertices[:, 2]
-        for id, solid in read_solids(finished_run[0] / "buildings.city.jsonl")
+        id: solid.vertices[:, 2] for id, solid in read_solids(town_run / "buildings.city.jsonl")
     }
     for i in range(3):
         assert heights[f"house-{i}"].max() == pytest.approx(2 + 8 + 0.3 * i + 0.14, abs=0.35)
         assert heights[f"house-{i}"].min() == pytest.approx(2 + 0.3 * i + 0.08, abs=0.15)
 
 
-def test_running_again_redoes_nothing_and_changes_nothing(finished_run, files):
-    out, summary = finished_run
+def test_running_again_redoes_nothing_and_changes_nothing(town_run, town_files, tmp_path):
+    out = shutil.copytree(town_run, tmp_path / "run")
     times = {name: (out / name).stat().st_mtime_ns for name in RECORDS}
-    repeat = reconstruct_area(Request((str(files[0]),), out, str(files[1])))
-    assert repeat.by_status == summary.by_status
+    repeat = reconstruct_area(Request((town_files[0],), out, town_files[1]))
+    assert repeat.by_status == {"modelled": 4} and repeat.exit_code == 0
     assert {name: (out / name).stat().st_mtime_ns for name in RECORDS} == times
 
 
-def test_how_the_area_is_cut_changes_no_byte(finished_run, tmp_path):
+def test_how_the_area_is_cut_changes_no_byte(town_run, tmp_path):
     town = make_town()
     rng = np.random.default_rng(3)
     names = rng.permutation(9)
@@ -181,7 +169,7 @@ def test_how_the_area_is_cut_changes_no_byte(finished_run, tmp_path):
         clouds.append(str(write_cloud(tmp_path / f"{name}.laz", xyz, classes)))
     footprints = write_footprints(tmp_path / "footprints.geojson", town.footprints)
     reconstruct_area(Request(tuple(sorted(clouds)), tmp_path / "out", str(footprints)))
-    assert records(tmp_path / "out") == records(finished_run[0])
+    assert records(tmp_path / "out") == records(town_run)
 
 
 @pytest.mark.parametrize("processes", [1, 2])
@@ -196,18 +184,18 @@ def test_progress_is_by_building(town_files, tmp_path, quick_tiles, processes):
 
 
 def test_two_workers_change_no_byte_and_compile_nothing(
-    finished_run, files, tmp_path, monkeypatch, spawned_workers
+    town_run, town_files, tmp_path, monkeypatch, spawned_workers
 ):
     monkeypatch.setattr("hiproof.city.plan.prepare.MOST_BUILDINGS_A_TILE", 1)
     make_ready()
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_without_compiling)
-    reconstruct_area(Request((str(files[0]),), tmp_path, str(files[1]), processes=2))
-    assert records(tmp_path) == records(finished_run[0])
+    reconstruct_area(Request((town_files[0],), tmp_path, town_files[1], processes=2))
+    assert records(tmp_path) == records(town_run)
 
 
-def test_an_interrupted_run_goes_on_and_ends_the_same(finished_run, files, tmp_path, monkeypatch):
+def test_an_interrupted_run_goes_on_and_ends_the_same(town_run, town_files, tmp_path, monkeypatch):
     monkeypatch.setattr("hiproof.city.plan.prepare.MOST_BUILDINGS_A_TILE", 1)
-    request = Request((str(files[0]),), tmp_path, str(files[1]))
+    request = Request((town_files[0],), tmp_path, town_files[1])
 
     def interrupt(step, finished, total):
         if step == "solve" and finished == 2:
@@ -223,11 +211,12 @@ def test_an_interrupted_run_goes_on_and_ends_the_same(finished_run, files, tmp_p
     )
     reconstruct_area(request)
     assert len(solved) == 3  # the interrupt came before the second tile was written
-    assert records(tmp_path) == records(finished_run[0])
+    assert records(tmp_path) == records(town_run)
 
 
-def test_a_killed_run_goes_on_and_ends_the_same(finished_run, files, tmp_path):
-    command = [sys.executable, "-m", "hiproof", "reconstruct", files[0], "--footprints", files[1]]
+def test_a_killed_run_goes_on_and_ends_the_same(town_run, town_files, tmp_path):
+    cloud, footprints = town_files
+    command = [sys.executable, "-m", "hiproof", "reconstruct", cloud, "--footprints", footprints]
     command, environment = [*command, "--out", tmp_path], {**os.environ, "PYTHONPATH": "src"}
     process = subprocess.Popen(command, env=environment)
     while not (tmp_path / ".hiproof" / "plan.jsonl").exists() and process.poll() is None:
@@ -235,7 +224,7 @@ def test_a_killed_run_goes_on_and_ends_the_same(finished_run, files, tmp_path):
     process.send_signal(signal.SIGKILL)
     process.wait()
     assert subprocess.run(command, env=environment, check=False).returncode == 0
-    assert records(tmp_path) == records(finished_run[0])
+    assert records(tmp_path) == records(town_run)
 
 
 def test_strange_footprints_each_get_an_outcome(tmp_path):
@@ -263,17 +252,17 @@ def test_strange_footprints_each_get_an_outcome(tmp_path):
     assert any(id.startswith("bow-tie") for id in by_id)
 
 
-def test_without_footprints_the_cloud_is_split(files, tmp_path):
-    summary = reconstruct_area(Request((str(files[0]),), tmp_path))
-    assert summary.by_status == {"modelled": 4}
+def test_without_footprints_the_cloud_is_split(town_files, tmp_path):
+    summary = reconstruct_area(Request((town_files[0],), tmp_path))
+    assert summary.by_status == {"modelled": 4} and summary.exit_code == 0
 
 
-def test_a_building_class_that_was_asked_for_and_is_not_there_is_refused(files, tmp_path):
+def test_a_building_class_that_was_asked_for_and_is_not_there_is_refused(town_files, tmp_path):
     settings = Settings.from_dict({"read": {"building_classes": [67]}})
-    for footprints in (str(files[1]), None):
+    for footprints in (town_files[1], None):
         with pytest.raises(InputError, match=r"class 67.*--building-class"):
             reconstruct_area(
-                Request((str(files[0]),), tmp_path, footprints, settings=settings, restart=True)
+                Request((town_files[0],), tmp_path, footprints, settings=settings, restart=True)
             )
 
 
@@ -289,7 +278,7 @@ def test_without_a_ground_class_the_ground_is_found(tmp_path):
     ("of_cloud", "of_footprints"), [("EPSG:7415", None), (None, "EPSG:28992"), (None, None)]
 )
 def test_the_output_carries_the_reference_system_that_any_input_names(
-    of_cloud, of_footprints, tmp_path
+    of_cloud, of_footprints, tmp_path, quick_tiles
 ):
     town = make_town(houses=1)
     cloud = write_cloud(tmp_path / "cloud.laz", town.xyz, town.classification, of_cloud)
@@ -308,8 +297,8 @@ def invoke(*arguments):
     return CliRunner().invoke(app, [str(a) for a in arguments])
 
 
-def test_the_command_line_says_what_it_did(files, tmp_path):
-    got = invoke("reconstruct", files[0], "--footprints", files[1], "--out", tmp_path)
+def test_the_command_line_says_what_it_did(town_files, tmp_path):
+    got = invoke("reconstruct", town_files[0], "--footprints", town_files[1], "--out", tmp_path)
     assert got.exit_code == 0, got.output
     assert "4 buildings" in got.output
     assert (
@@ -337,7 +326,7 @@ def test_the_command_line_says_what_it_did(files, tmp_path):
     ],
 )
 def test_wrong_usage_gets_one_sentence_and_exit_code_2(
-    arguments, expected, files, tmp_path, capsys
+    arguments, expected, town_files, tmp_path, capsys
 ):
-    assert run_hiproof(*(a.format(cloud=files[0], out=tmp_path) for a in arguments)) == 2
+    assert run_hiproof(*(a.format(cloud=town_files[0], out=tmp_path) for a in arguments)) == 2
     assert expected in capsys.readouterr().err

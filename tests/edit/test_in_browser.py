@@ -99,18 +99,7 @@ def test_a_wrong_type_is_changed_refitted_and_accepted(page, folder):
     assert edits["house-0"]["note"] == "seen from the street"
 
 
-def test_an_id_cannot_turn_its_line(page):
-    """U+202E turns what follows it, in programs that obey it."""
-    shown = page.evaluate(
-        """() => {
-          rows[0].id = "house-\u202e0"; showList();
-          return rows[0].button.firstChild.textContent;
-        }"""
-    )
-    assert shown.startswith("house-\\u202e0 ")
-
-
-def test_keys_go_through_the_buildings(page):
+def test_keys_go_through_the_buildings_and_can_be_turned_off(page):
     first = page.inner_text("#title")
     for letter in "n", "p":
         press_key(page, letter)
@@ -125,6 +114,19 @@ def test_keys_go_through_the_buildings(page):
     assert page.locator("[data-part]").count() == 1
     press_key(page, "u")
     assert page.inner_text("#say") == "nothing to undo"
+    for count in 1, 2:
+        page.focus("#letter-keys")
+        page.keyboard.press("Space")
+        press_key(page, "s")
+        assert page.locator("[data-part]").count() == count
+    # U+202E turns what follows it, in programs that obey it
+    shown = page.evaluate(
+        """() => {
+          rows[0].id = "house-\u202e0"; showList();
+          return rows[0].button.firstChild.textContent;
+        }"""
+    )
+    assert shown.startswith("house-\\u202e0 ")
 
 
 def test_a_handle_drags_the_ridge_and_undo_brings_it_back(page):
@@ -245,7 +247,7 @@ def test_the_ground_and_leaving_out_are_accepted_and_obeyed_by_the_next_run(
     assert set(dict(read_overrides(str(folder / EDITS_FILE)))) == {"house-1"}
 
 
-def test_undo_back_to_what_was_accepted_leaves_nothing_changed(page):
+def test_undo_back_to_what_was_accepted_leaves_nothing_changed_as_its_tag_says(page):
     choose(page, "house-0")
     mark = "[data-id=house-0]"
     page.select_option("#type", "gable")
@@ -258,6 +260,16 @@ def test_undo_back_to_what_was_accepted_leaves_nothing_changed(page):
     wait_for_building(page, "house-0: gable")
     press_key(page, "u")
     assert page.get_attribute(mark, "class").split() == ["current", "accepted"]
+    choose(page, "house-1")
+    press_key(page, "s")
+    for id, text in (("house-0", "accepted"), ("house-1", "changed")):
+        row, tag = page.locator(f"[data-id={id}]"), page.locator(f"[data-id={id}] .tag")
+        assert tag.inner_text() == text
+        outer, inner = row.bounding_box(), tag.bounding_box()
+        assert outer["y"] <= inner["y"]
+        assert inner["y"] + inner["height"] <= outer["y"] + outer["height"]
+        assert inner["x"] + inner["width"] <= outer["x"] + outer["width"]
+    assert page.locator(".tag:visible").count() == 2
 
 
 def test_a_server_that_is_gone_is_said_and_costs_nothing(page):
@@ -319,21 +331,6 @@ def test_axe_finds_nothing_and_the_whole_building_is_shown(browser, page_service
         assert list_complaints(page) == [] and not is_too_wide(page)
 
 
-def test_the_tag_of_a_building_stands_in_its_own_row(page):
-    choose(page, "house-0")
-    press_key(page, "a")
-    choose(page, "house-1")
-    press_key(page, "s")
-    for id, text in (("house-0", "accepted"), ("house-1", "changed")):
-        row, tag = page.locator(f"[data-id={id}]"), page.locator(f"[data-id={id}] .tag")
-        assert tag.inner_text() == text
-        outer, inner = row.bounding_box(), tag.bounding_box()
-        assert outer["y"] <= inner["y"]
-        assert inner["y"] + inner["height"] <= outer["y"] + outer["height"]
-        assert inner["x"] + inner["width"] <= outer["x"] + outer["width"]
-    assert page.locator(".tag:visible").count() == 2
-
-
 def read_focus(page):
     return page.evaluate(
         "() => ({ id: document.activeElement.id, ...document.activeElement.dataset })"
@@ -377,14 +374,3 @@ def test_a_building_is_edited_by_keys_alone(page):
     page.keyboard.press("Enter")
     page.evaluate("() => queue")
     assert read_focus(page)["id"] == "refit"
-
-
-def test_letter_keys_can_be_turned_off(page):
-    choose(page, "house-0")
-    page.focus("#letter-keys")
-    page.keyboard.press("Space")
-    press_key(page, "s")
-    assert page.locator("[data-part]").count() == 1
-    page.keyboard.press("Space")
-    press_key(page, "s")
-    assert page.locator("[data-part]").count() == 2
