@@ -83,7 +83,7 @@ class Operation:
     @staticmethod
     def from_dict(values: dict[str, Any]) -> Operation:
         lists = {name: tuple(values[name]) for name in ("place", "missing_grids")}
-        return Operation(**{**values, **lists})
+        return Operation(**values | lists)
 
 
 def find_operation(subject: str, source: CRS, target: CRS, place: tuple[float, float]) -> Operation:

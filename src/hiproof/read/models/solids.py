@@ -22,7 +22,6 @@ from ...frames import METRES, Units
 from ...log import count_things
 from ...model import WALL, Face, Solid
 from ..crs import find_named_units, refuse_other_crs
-from ..remote import FilePath
 from .cityjson import UNUSABLE, features, read_geometries, read_shell, require_list, unusable
 from .damage import Damaged, refuse
 
@@ -40,7 +39,7 @@ SURFACES = tuple(
 MEMBERS = ("{*}cityObjectMember", "{*}featureMember")
 
 
-def read_solids(path: FilePath, damaged: Damaged = refuse) -> Iterator[tuple[str, Solid]]:
+def read_solids(path: str | Path, damaged: Damaged = refuse) -> Iterator[tuple[str, Solid]]:
     """Yield (id, Solid) for each shell in a file, in metres.
 
     Files end in `.json`, `.jsonl` or `.gml`.

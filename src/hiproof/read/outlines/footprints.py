@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -34,7 +35,7 @@ from ..remote import FilePath
 from .attribute_columns import attribute_rows
 from .database import is_database, read_table, table_crs
 from .geoparquet import is_parquet
-from .polygons import Features, is_surface, simple_polygons
+from .polygons import Features, Layer, is_surface, simple_polygons
 
 # What GDAL calls the CRSs -1, 0 and 99999 of a GeoPackage, which has to name one.
 UNDEFINED_CRS = ("Undefined Cartesian SRS", "Undefined geographic SRS", "Undefined SRS")
@@ -45,7 +46,7 @@ ID_NAMES: list[str] = READING["id_names"]
 
 
 def read_footprints(
-    path: FilePath,
+    path: str | Path,
     layer: str | int | None = None,
     id_attribute: str | None = None,
     target_crs: Any = None,
@@ -86,7 +87,7 @@ def meets(polygon: shapely.Polygon, bbox: Box, units: Units) -> bool:
     return bool(shapely.intersects(polygon, shapely.box(*units.to_metres(bbox))))
 
 
-def footprint_crs(path: FilePath, layer: str | int | None = None) -> CRS | None:
+def footprint_crs(path: FilePath, layer: Layer = None) -> CRS | None:
     """Return the CRS that a file names, or None; raises InputError as `read_footprints`."""
     if is_database(path):
         return plan_crs(table_crs(str(path)), path)
@@ -112,7 +113,7 @@ def plan_crs(text: str | CRS | None, path: FilePath) -> CRS | None:
 
 def read_features(
     path: FilePath,
-    layer: str | int | None,
+    layer: Layer,
     where: str | None = None,
     bbox: Box | None = None,
     bbox_crs: CRS | None = None,

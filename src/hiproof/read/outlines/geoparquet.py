@@ -29,10 +29,10 @@ from ...extras import import_extra
 from ..crs import read_named_crs
 from ..remote import FilePath, is_url, open_binary
 from .attribute_columns import plain_value, quote, shortest
-from .polygons import Features, decode_geometries
+from .polygons import Features, Layer, decode_geometries
 
 
-def read_crs(path: FilePath, layer: str | int | None) -> CRS | None:
+def read_crs(path: FilePath, layer: Layer) -> CRS | None:
     """Return the CRS that a GeoParquet file names, None where it leaves it open."""
     with open_parquet(path) as file:
         return geometry_column(file, path).crs
@@ -40,7 +40,7 @@ def read_crs(path: FilePath, layer: str | int | None) -> CRS | None:
 
 def read_features(
     path: FilePath,
-    layer: str | int | None,
+    layer: Layer,
     where: str | None,
     box_in: Callable[[CRS | None], tuple[float, ...] | None],
 ) -> Features:

@@ -15,6 +15,8 @@ import shapely
 from ...geometry.rings import repair_polygons
 from ..plausible import is_plausible
 
+Layer = str | int | None  # of a file, by name or number; None for its only one
+
 # Metadata (fields and crs), feature numbers, geometries and columns of a layer.
 Features = tuple[dict[str, Any], np.ndarray, np.ndarray, list[np.ndarray]]
 

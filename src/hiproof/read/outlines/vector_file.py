@@ -20,7 +20,7 @@ from ...errors import InputError, explain_fault, warn
 from ...frames import Box
 from ..remote import FilePath, is_url
 from .attribute_columns import restore_declared_type
-from .polygons import Features, decode_geometries
+from .polygons import Features, Layer, decode_geometries
 
 SLASHED_DATE = re.compile(r"^(\d{1,5})/(\d\d)/(\d\d)")  # how GDAL writes a date as text
 
@@ -30,7 +30,7 @@ READ_ERRORS = (ValueError, OverflowError, FieldError)
 
 
 def read_layer(
-    path: str, layer: str | int | None, **chosen: Any
+    path: str, layer: Layer, **chosen: Any
 ) -> tuple[dict[str, Any], np.ndarray, np.ndarray, list[np.ndarray], list[str]]:
     """Read pyogrio's metadata, numbers, WKB and columns of a layer, in their declared types.
 
@@ -60,7 +60,7 @@ def read_layer(
     return {**meta, "fields": names}, numbers, wkb, [values[name] for name in names], odd
 
 
-def is_readable(path: str, layer: str | int | None, name: str) -> bool:
+def is_readable(path: str, layer: Layer, name: str) -> bool:
     """Return whether pyogrio can represent every value of an attribute."""
     try:
         pyogrio.raw.read(
@@ -71,9 +71,7 @@ def is_readable(path: str, layer: str | int | None, name: str) -> bool:
     return True
 
 
-def column_as_text(
-    path: str, layer: str | int | None, numbers: np.ndarray, name: str
-) -> np.ndarray:
+def column_as_text(path: str, layer: Layer, numbers: np.ndarray, name: str) -> np.ndarray:
     """Return an attribute (n,) of these features as text, broken UTF-8 replaced."""
     layer_name = pyogrio.read_info(path, layer=layer)["layer_name"]
     # one attribute alone, as text
@@ -130,7 +128,7 @@ def virtual_layer(path: str, layer: str, declared: str) -> str:
 
 def read_features(
     path: FilePath,
-    layer: str | int | None,
+    layer: Layer,
     where: str | None,
     make_box: Callable[[Any], Box | None],
 ) -> Features:
@@ -155,14 +153,12 @@ def read_features(
     return meta, numbers, decode_geometries(wkb), columns
 
 
-def read_crs(path: FilePath, layer: str | int | None) -> str | None:
+def read_crs(path: FilePath, layer: Layer) -> str | None:
     """Return the CRS that a layer names, in GDAL's form."""
     return open_layer(path, layer)[2]["crs"]
 
 
-def open_layer(
-    path: FilePath, layer: str | int | None
-) -> tuple[str, str | int | None, dict[str, Any]]:
+def open_layer(path: FilePath, layer: Layer) -> tuple[str, Layer, dict[str, Any]]:
     """Return what pyogrio can open in place of `path`, the layer there, and its metadata."""
     with translate_read_errors(path):
         source, layer = str(path), choose_layer(path, layer)
@@ -175,7 +171,7 @@ def open_layer(
             return source, None, pyogrio.read_info(source)
 
 
-def choose_layer(path: FilePath, layer: str | int | None) -> str | int | None:
+def choose_layer(path: FilePath, layer: Layer) -> Layer:
     """Return `layer`, or the only one with geometries; InputError lists several."""
     if layer is not None:
         return layer

@@ -268,9 +268,9 @@ def check_coordinates(facts: LasFacts) -> None:
     reached = (facts.mins >= facts.offsets - reach) & (facts.maxs <= facts.offsets + reach)
     if not (ordered & reached).all():
         raise Implausible(
-            f"its header's bounds ({format_list(facts.mins)}) to ({format_list(facts.maxs)}) "
-            f"cannot be those of coordinates with the offset ({format_list(facts.offsets)}) and "
-            f"the scale ({format_list(facts.scales)})"
+            f"its header's bounds {format_span(facts.mins, facts.maxs)} cannot be those of "
+            f"coordinates with the offset ({format_list(facts.offsets)}) and the scale "
+            f"({format_list(facts.scales)})"
         )
 
 
@@ -287,7 +287,7 @@ def with_octree(file: BinaryIO, facts: LasFacts, info: bytes) -> LasFacts:
             "header's bounds"
         )
     nodes = walk_pages(file, facts, page, page_bytes)
-    points = int(nodes["points"].sum(dtype=np.int64))
+    points = nodes["points"].sum(dtype=np.int64)
     if points != facts.count:
         raise Implausible(
             f"its header tells of {facts.count} points, the nodes of its octree of {points}"
@@ -335,9 +335,8 @@ def check_points(xyz: np.ndarray, facts: LasFacts) -> tuple[np.ndarray, np.ndarr
     lower, upper = compute_bounds(xyz) if len(xyz) else (facts.mins, facts.maxs)
     if not ((lower >= facts.mins - facts.rounding) & (upper <= facts.maxs + facts.rounding)).all():
         raise Implausible(
-            f"it has points from ({format_list(lower)}) to ({format_list(upper)}), outside its "
-            f"header's bounds ({format_list(facts.mins)}) to ({format_list(facts.maxs)}); its "
-            "header or its points are damaged"
+            f"it has points from {format_span(lower, upper)}, outside its header's bounds "
+            f"{format_span(facts.mins, facts.maxs)}; its header or its points are damaged"
         )
     return lower, upper
 
@@ -346,15 +345,18 @@ def check_all_points(lower: np.ndarray, upper: np.ndarray, facts: LasFacts) -> N
     """Raise Implausible where points from `lower` to `upper` (3,) fall short of the bounds."""
     if not ((lower <= facts.mins + SHORT) & (upper >= facts.maxs - SHORT)).all():
         raise Implausible(
-            f"its points reach from ({format_list(lower)}) to ({format_list(upper)}), its header's "
-            f"bounds from ({format_list(facts.mins)}) to ({format_list(facts.maxs)}); its scale, "
-            "its count or its bounds are wrong"
+            f"its points reach from {format_span(lower, upper)}, its header's bounds from "
+            f"{format_span(facts.mins, facts.maxs)}; its scale, its count or its bounds are wrong"
         )
 
 
 # How far the points may fall short of the header's bounds, in the file's unit: some producers write
 # those of the tile.
 SHORT = 1.0
+
+
+def format_span(lower: np.ndarray, upper: np.ndarray) -> str:
+    return f"({format_list(lower)}) to ({format_list(upper)})"
 
 
 def format_list(values: Iterable[float]) -> str:

@@ -99,7 +99,7 @@ class PointFileHeader:
 
 
 def read_points(
-    *paths: FilePath, settings: Settings | None = None, box: Box | None = None
+    *paths: str | Path, settings: Settings | None = None, box: Box | None = None
 ) -> PointCloud:
     """Read all points of the files, folders or wildcards `paths`.
 

@@ -97,17 +97,15 @@ def sniff(path: FilePath) -> TextLayout:
     for number, line in enumerate(lines):
         text = line.strip().lstrip("#/").strip()
         delimiter = find_delimiter(text)
-        fields = [field for field in text.split(delimiter) if delimiter or field]
-        if len(fields) < 3 or not text:  # blank, or the count that starts a PTS file
+        fields, is_comment = text.split(delimiter), line.lstrip().startswith(COMMENTS)
+        if len(fields) < 3:  # blank, or the count that starts a PTS file
             continue
-        if not line.lstrip().startswith(COMMENTS) and all(is_number(field) for field in fields[:3]):
+        if not is_comment and all(map(is_number, fields[:3])):
             return TextLayout(number, delimiter, find_columns(names) or (0, 1, 2))
         if columns := find_columns(fields):
             names = fields
-            following = next(
-                (remainder for remainder in lines[number + 1 :] if remainder.strip()), None
-            )
-            if following and not line.lstrip().startswith(COMMENTS):
+            following = next(filter(str.strip, lines[number + 1 :]), None)
+            if following and not is_comment:
                 return TextLayout(number + 1, find_delimiter(following), columns)
         elif number > 20:
             break

@@ -7,13 +7,13 @@ know.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 
 from ...errors import InputError, explain_fault
 from ...frames import Units
-from ..remote import FilePath
 from .raster import RasterTerrain, import_rasterio
 
 
@@ -71,7 +71,7 @@ class TerrainChain:
         return heights, tuple(sources)
 
 
-def read_terrain(path: FilePath, crs: Any = None, units: Units | None = None) -> RasterTerrain:
+def read_terrain(path: str | Path, crs: Any = None, units: Units | None = None) -> RasterTerrain:
     """Open the terrain model at `path` for queries in world metres of `crs`.
 
     Raises InputError. `units` tell those of a cloud without a CRS. It takes rasterio, the extra
