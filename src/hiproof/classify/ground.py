@@ -89,7 +89,7 @@ def is_lone(lowest: np.ndarray) -> np.ndarray:
     return np.asarray(n_as_low <= LONE_SHARE * NEAREST)
 
 
-def remove_objects(lowest: np.ndarray, cell_m: float = CELL_M) -> np.ndarray:
+def remove_objects(lowest: np.ndarray, cell_m: float) -> np.ndarray:
     """Replace lowest heights of cells (c, r) that are not the ground's by NaN."""
     lowest = np.where(lowest < np.nanmedian(lowest) - ABYSS_M, np.nan, lowest)
     level = lowest - fit_plane(lowest, cell_m)

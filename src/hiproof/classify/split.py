@@ -95,8 +95,8 @@ def divide_roof_points(
     xyz: np.ndarray,
     read: ReadSettings,
     is_cut_out: bool,
-    box: Box | None = None,
-    progress: Progress = ignore,
+    box: Box | None,
+    progress: Progress,
 ) -> list[FoundBuilding]:
     """Divide the `roof` points (indices) among buildings, those that may meet a `box`."""
     if not len(roof):
@@ -165,7 +165,7 @@ def select_large_groups(
 
 
 def select_roof_points(
-    cloud: PointCloud, read: ReadSettings, box: Box | None = None, progress: Progress = ignore
+    cloud: PointCloud, read: ReadSettings, box: Box | None, progress: Progress
 ) -> tuple[np.ndarray, bool, list[FoundBuilding]]:
     """Return ascending indices of the points that may be roofs.
 

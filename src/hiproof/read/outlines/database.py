@@ -129,9 +129,7 @@ def open_source(source: str, condition: str | None = None) -> Iterator[DatabaseT
             connection.cursor() as cursor,
         ):
             connection.read_only = True
-            yield DatabaseTable(
-                cursor, table, geometry or geometry_column(cursor, table, source), where
-            )
+            yield DatabaseTable(cursor, table, geometry or geometry_column(cursor, table), where)
     except psycopg.Error as error:
         reason = str(error).strip().splitlines()[0]
         raise InputError(
@@ -168,7 +166,7 @@ def refuse_half_a_password(address: str) -> str:
     return address
 
 
-def geometry_column(cursor: Any, table: str, source: str) -> str:
+def geometry_column(cursor: Any, table: str) -> str:
     schema, _, name = table.rpartition(".")
     sql = (
         "select f_geometry_column from geometry_columns where f_table_name = %s and (%s = '' or "

@@ -56,7 +56,6 @@ class LasFacts:
     created: tuple[int, int]
     has_gps_time: bool
     data_start: int
-    point_format: int
     compressed: bool
     point_bytes: int
     count: int
@@ -145,7 +144,6 @@ def parse_header(head: bytes, size: int) -> tuple[LasFacts, tuple[Section, ...]]
         (day, year),
         bool(encoding & 1),
         data_start,
-        point_format,
         bool(kind & COMPRESSED),
         point_bytes,
         count,

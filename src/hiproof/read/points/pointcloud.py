@@ -94,7 +94,6 @@ class PointFileHeader:
     bounds: tuple[float, float, float, float, float, float]
     count: int
     crs: Any = None
-    point_format: int | None = None
     steps: tuple[float, float] = (0.0, 0.0)
 
 
@@ -225,9 +224,7 @@ def las_file_header(path: FilePath) -> PointFileHeader | None:
     facts = las.read_checked_facts(path)
     bounds = (*facts.mins.tolist(), *facts.maxs.tolist())
     steps = (float(max(facts.scales[:2])), float(facts.scales[2]))
-    return PointFileHeader(
-        str(path), bounds, facts.count, las_crs(facts.projection), facts.point_format, steps
-    )
+    return PointFileHeader(str(path), bounds, facts.count, las_crs(facts.projection), steps)
 
 
 def find_steps(xyz: np.ndarray) -> tuple[float, float]:
@@ -352,7 +349,7 @@ def file_kind(path: FilePath) -> str:
     )
 
 
-def common_crs(crs_of: dict[str, Any], arguments: Any = None, unit: str = "auto") -> Any:
+def common_crs(crs_of: dict[str, Any], arguments: Any, unit: str) -> Any:
     """Return the one CRS of point files, from what each names.
 
     It is `arguments` where that is a CRS, else the files' own. Files that name none go with those
