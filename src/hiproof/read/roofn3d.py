@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,9 +56,14 @@ def read_roofn3d(path: FilePath) -> Iterator[RoofN3DRecord]:
             repeated += 1
             continue
         visited.add(row["id"])
-        with naming_row(path, number):
+        try:
             points, outline = coordinates(row["points"]), polygon(row["outline"])
-        class_name = (row["class"] or "").strip()
+        except (ValueError, shapely.errors.ShapelyError) as error:
+            raise InputError(
+                f"expected WKT coordinates in row {number} of {path}, got: {error}; the file may "
+                "be cut off: download it again"
+            ) from error
+        class_name = row["class"].strip()
         yield RoofN3DRecord(
             row["id"], ROOFN3D_TYPES.get(class_name.lower()), class_name, points, outline
         )
@@ -79,13 +83,12 @@ def read_roofn3d_labels(
     """
     offsets = surface_offsets(path)
     with open(path, "rb") as file:
-        header = next(csv.reader([file.readline().decode("utf-8-sig")]))
+        column = split_line(file.readline()).index("points")
         for record in records:
             labels = np.full(len(record.points), UNASSIGNED)
             for label, offset in enumerate(offsets.get(record.id, ())):
                 file.seek(offset)
-                values = next(csv.reader([file.readline().decode()]))
-                surface = coordinates(dict(zip(header, values, strict=False))["points"])
+                surface = coordinates(split_line(file.readline())[column])
                 labels[np.isin(point_keys(record.points), point_keys(surface))] = label
             yield record, labels
 
@@ -96,15 +99,18 @@ def surface_offsets(path: FilePath) -> dict[str, list[int]]:
     next(rows(path, ("points", "fk_buildings")), None)
     offsets: dict[str, list[int]] = {}
     with open(path, "rb") as file:
-        header = next(csv.reader([file.readline().decode("utf-8-sig")]))
-        column = header.index("fk_buildings")
+        column = split_line(file.readline()).index("fk_buildings")
         start = file.tell()
         for line in iter(file.readline, b""):
-            values = next(csv.reader([line.decode()]), [])
+            values = split_line(line)
             if len(values) > column:
                 offsets.setdefault(values[column].strip(), []).append(start)
             start = file.tell()
     return offsets
+
+
+def split_line(line: bytes) -> list[str]:
+    return next(csv.reader([line.decode("utf-8-sig")]), [])
 
 
 def rows(path: FilePath, required: tuple[str, ...]) -> Iterator[tuple[int, dict[str, str]]]:
@@ -125,17 +131,6 @@ def rows(path: FilePath, required: tuple[str, ...]) -> Iterator[tuple[int, dict[
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError(
             f"expected a CSV file of RoofN3D at {path}, got: {error}; check the file"
-        ) from error
-
-
-@contextmanager
-def naming_row(path: FilePath, number: int) -> Iterator[None]:
-    try:
-        yield
-    except (ValueError, shapely.errors.ShapelyError) as error:
-        raise InputError(
-            f"expected WKT coordinates in row {number} of {path}, got: {error}; the file may be "
-            "cut off: download it again"
         ) from error
 
 

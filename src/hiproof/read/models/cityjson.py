@@ -144,19 +144,17 @@ def features(
     feature that cannot be read is told to `damaged` and comes without objects. Raises InputError as
     `documents` does.
     """
-    transform, units = None, crs_units or alternative
-    first_name, seen_head = None, False
-    for document, place in documents(path, damaged):
+    transform, units, first_name = None, crs_units or alternative, None
+    for number, (document, place) in enumerate(documents(path, damaged)):
         nothing = Feature({}, np.empty((0, 3)), place, units, True)
         if not document:
             yield nothing
             continue
         name = reference_system(document)
-        if seen_head:
+        if number:
             refuse_other_crs(first_name, name, place)
-        elif name:
-            units = crs_units or find_named_units(name, alternative)
-        first_name, seen_head = first_name if seen_head else name, True
+        else:
+            first_name, units = name, crs_units or find_named_units(name, alternative)
         try:
             transform = read_transform(document) or transform
             objects = document.get("CityObjects")
