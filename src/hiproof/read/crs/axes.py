@@ -30,8 +30,9 @@ def check_plan_axes(plan: Any, source: str) -> None:
     east before north whatever order a CRS declares, so north before east is usual. A local system
     may be turned, but not mirrored.
     """
-    directions = [axis.direction for axis in plan.axis_info[:2]]
-    if len(directions) < 2:
+    axes = plan.axis_info[:2]
+    directions = [axis.direction for axis in axes]
+    if len(axes) < 2:
         raise InputError(
             f"expected {source} in a CRS of two axes in plan, got {plan.name} "
             f"({plan.type_name.lower()}); name a projected CRS with --crs"
@@ -42,9 +43,9 @@ def check_plan_axes(plan: Any, source: str) -> None:
             f"axes run {' and '.join(directions)}; reproject to a CRS of the place that counts "
             "east and north"
         )
-    for axis in plan.axis_info[:2]:
+    for axis in axes:
         check_unit(axis, plan, source)
-    first, second = plan.axis_info[:2]
+    first, second = axes
     if first.unit_conversion_factor != second.unit_conversion_factor:
         raise InputError(
             f"expected {source} in a CRS with one unit in plan, got {plan.name} in "

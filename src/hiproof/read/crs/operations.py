@@ -116,17 +116,15 @@ def operation_at(source: str, target: str, place: tuple[float, float]) -> Operat
     except ProjError:  # a single operation, which is the transformer itself
         in_use = transformer
     accuracy = in_use.accuracy if in_use.accuracy is not None and in_use.accuracy >= 0 else None
-    better = [
-        way
-        for way in missing_ways(source, target, place)
-        if accuracy is None or 0 <= way.accuracy < accuracy  # a negative one is unknown
-    ]
     operation = Operation("", source, target, place, in_use.description, accuracy)
-    if not better:
-        return operation
-    grids = tuple(dict.fromkeys(grid.short_name for grid in better[0].grids if not grid.available))
-    missing_accuracy = better[0].accuracy if better[0].accuracy >= 0 else None
-    return dataclasses.replace(operation, missing_grids=grids, missing_accuracy_m=missing_accuracy)
+    for way in missing_ways(source, target, place):
+        if accuracy is None or 0 <= way.accuracy < accuracy:  # a negative one is unknown
+            grids = dict.fromkeys(grid.short_name for grid in way.grids if not grid.available)
+            better = way.accuracy if way.accuracy >= 0 else None
+            return dataclasses.replace(
+                operation, missing_grids=tuple(grids), missing_accuracy_m=better
+            )
+    return operation
 
 
 def missing_ways(source: str, target: str, place: tuple[float, float]) -> list:

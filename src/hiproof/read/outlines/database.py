@@ -168,16 +168,16 @@ def refuse_half_a_password(address: str) -> str:
 
 def geometry_column(cursor: Any, table: str) -> str:
     schema, _, name = table.rpartition(".")
-    sql = (
+    cursor.execute(
         "select f_geometry_column from geometry_columns where f_table_name = %s and (%s = '' or "
-        "f_table_schema = %s)"
+        "f_table_schema = %s)",
+        (name, schema, schema),
     )
-    cursor.execute(sql, (name, schema, schema))
-    result = [column for (column,) in cursor.fetchall()]
+    result = [column for (column,) in cursor]
     if len(result) != 1:
-        got = ", ".join(result) or "none"
         raise InputError(
-            f"expected one geometry column in {table}, got {got}; name it with &geometry="
+            f"expected one geometry column in {table}, got {', '.join(result) or 'none'}; name it "
+            "with &geometry="
         )
     return result[0]
 

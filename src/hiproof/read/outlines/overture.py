@@ -66,21 +66,14 @@ def read_document(address: str) -> Document:
             if not isinstance(content, dict):
                 raise ValueError("no document")
             return Document(address, content)
-        except (FileNotFoundError, ImportError, ValueError) as error:
-            raise unreadable(address, error) from error
         except Exception as error:  # each of fsspec's file systems raises errors of its own
-            if not left:
-                raise unreadable(address, error) from error
+            if not left or isinstance(error, FileNotFoundError | ImportError | ValueError):
+                raise InputError(
+                    f"expected a STAC catalogue at {address}, got: "
+                    f"{str(error) or type(error).__name__}; check the address and the network"
+                ) from error
             time.sleep(PAUSE_S)
     raise AssertionError("the last try returns or raises")
-
-
-def unreadable(address: str, error: Exception) -> InputError:
-    """Make the error for a document that cannot be read."""
-    return InputError(
-        f"expected a STAC catalogue at {address}, got: {str(error) or type(error).__name__}; check "
-        "the address and the network"
-    )
 
 
 def items_meeting(collection: Document, extent: shapely.Geometry) -> list[Document]:
@@ -95,8 +88,8 @@ def meets(box: Sequence[float] | None, extent: shapely.Geometry) -> bool:
     """Return whether an item's box (2D or 3D) meets `extent`; without one it does."""
     if not box:
         return True
-    half = len(box) // 2
-    return bool(shapely.intersects(shapely.box(*box[:2], *box[half : half + 2]), extent))
+    upper = box[len(box) // 2 :]
+    return bool(shapely.intersects(shapely.box(*box[:2], *upper[:2]), extent))
 
 
 def find_asset(item: Document, suffix: str) -> str:
@@ -232,8 +225,7 @@ def summarise_sources(table: Any) -> list[dict[str, Any]]:
     for sources in table.column("sources").to_pylist():
         found = {(str(one.get("dataset")), one.get("license")) for one in sources or ()}
         counts.update(found)
-    by_name = sorted(counts.items(), key=lambda pair: (pair[0][0], pair[0][1] or ""))
     return [
-        {"dataset": dataset, "licence": licence, "footprints": count}
-        for (dataset, licence), count in by_name
+        {"dataset": dataset, "licence": licence, "footprints": counts[dataset, licence]}
+        for dataset, licence in sorted(counts, key=lambda found: (found[0], found[1] or ""))
     ]

@@ -81,13 +81,13 @@ def overlap(polygons: list[shapely.Polygon]) -> bool:
 def unite_polygons(polygons: list[shapely.Polygon]) -> list[shapely.Polygon]:
     """Return the union of polygons without the hairline gaps that rounding leaves."""
     whole = shapely.simplify(shapely.union_all(polygons, grid_size=JOIN_M), JOIN_M)
-    parts = [part for part in polygons_in(whole) if part.area > SLIVER_M2]
     return [
         shapely.Polygon(
             part.exterior,
             [hole for hole in part.interiors if shapely.Polygon(hole).area > SLIVER_M2],
         )
-        for part in parts
+        for part in polygons_in(whole)
+        if part.area > SLIVER_M2
     ]
 
 
@@ -115,13 +115,8 @@ def repair_polygon(polygon: shapely.Polygon) -> list[shapely.Polygon]:
         return []
     else:  # the area that its rings enclose; what they enclose twice counts once
         result = polygons_in(repair_polygons(polygon))
-    total = sum(part.area for part in result)
-    smallest = min(SLIVER_M2, SLIVER_SHARE * total)
-    return [
-        part
-        for part in result
-        if part.area > max(smallest if len(result) > 1 else 0.0, DEGENERATE_M2)
-    ]
+    smallest = min(SLIVER_M2, SLIVER_SHARE * sum(part.area for part in result))
+    return [part for part in result if part.area > max(smallest, DEGENERATE_M2)]
 
 
 def is_buildings_size(polygon: shapely.Polygon) -> bool:

@@ -79,7 +79,6 @@ class RasterTerrain:
         remember(str(path))
         self.path, self.source = str(path), f"terrain model {Path(mask(str(path))).name}"
         self.crs = parse_crs(crs)
-        self.tile = functools.lru_cache(TILES_KEPT)(self.read_tile)
         refuse_without_position(self.dataset, self.path)
         self.band, self.alpha = choose_bands(self.dataset, self.path)
         self.scale, self.offset = read_scaling(self.dataset, self.band, self.path)
@@ -105,13 +104,13 @@ class RasterTerrain:
 
     def __getstate__(self) -> dict:
         """Leave out the open file and tiles, so that a worker opens its own."""
-        opened = ("dataset", "transformer", "tile")
+        opened = ("dataset", "tile")
         return {name: value for name, value in vars(self).items() if name not in opened}
 
-    def __setstate__(self, state: dict) -> None:
-        vars(self).update(state)
-        self.tile = functools.lru_cache(TILES_KEPT)(self.read_tile)
-        self.transformer = self.make_transformer()
+    @cached_property
+    def tile(self) -> Callable[[int, int], np.ndarray]:
+        """`read_tile` that keeps a few tiles."""
+        return functools.lru_cache(TILES_KEPT)(self.read_tile)
 
     @property
     def own_crs(self) -> CRS | None:
