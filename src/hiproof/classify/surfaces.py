@@ -74,11 +74,9 @@ def thin_to_voxels(xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     cell -= cell.min(axis=0)
     size = cell.max(axis=0) + 1
     key = (cell[:, 0] * size[1] + cell[:, 1]) * size[2] + cell[:, 2]
-    order = np.lexsort((hashes(xyz), key))
-    _, first, voxel = np.unique(key[order], return_index=True, return_inverse=True)
-    of_point = np.empty(len(xyz), np.int64)
-    of_point[order] = voxel
-    return order[first], of_point
+    _, voxel = np.unique(key, return_inverse=True)
+    order = np.lexsort((hashes(xyz), voxel))
+    return order[np.diff(voxel[order], prepend=-1) > 0], voxel
 
 
 def fit_planes(groups: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
