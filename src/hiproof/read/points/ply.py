@@ -71,22 +71,23 @@ def read_ply_header(file: BinaryIO, path: FilePath) -> PlyLayout:
     types: dict[str, str] = {}
     byte_order, count, element = None, None, None
     for words in header_lines(file, path):
-        if words[0] == "format" and len(words) > 1:
-            byte_order = BYTE_ORDERS.get(words[1])
-        elif words[0] == "element" and len(words) == 3:
-            if count is None and words[1] != "vertex":
-                raise unreadable(path, f"the element {words[1]!r} before the vertices")
-            element = words[1]
-            if element == "vertex":
-                if count is not None or not PLAIN_COUNT.fullmatch(words[2]):
-                    raise unreadable(path, f"{words[2][:20]!r} vertices")
-                count = int(words[2])
-        elif words[0] == "property" and element == "vertex":
-            if len(words) != 3 or words[1] not in PLY_TYPES:
-                raise unreadable(path, f"the vertex property {' '.join(words[1:])!r}")
-            if words[2] in types:
-                raise unreadable(path, f"the vertex property {words[2]!r} twice")
-            types[words[2]] = PLY_TYPES[words[1]]
+        match words:
+            case ["format", name, *_]:
+                byte_order = BYTE_ORDERS.get(name)
+            case ["element", name, number]:
+                if count is None and name != "vertex":
+                    raise unreadable(path, f"the element {name!r} before the vertices")
+                element = name
+                if name == "vertex":
+                    if count is not None or not PLAIN_COUNT.fullmatch(number):
+                        raise unreadable(path, f"{number[:20]!r} vertices")
+                    count = int(number)
+            case ["property", kind, name] if element == "vertex" and kind in PLY_TYPES:
+                if name in types:
+                    raise unreadable(path, f"the vertex property {name!r} twice")
+                types[name] = PLY_TYPES[kind]
+            case ["property", *others] if element == "vertex":
+                raise unreadable(path, f"the vertex property {' '.join(others)!r}")
     columns = find_columns(list(types))
     if byte_order is None or count is None or columns is None:
         raise unreadable(path, "a header without format, vertices or their x, y, z")

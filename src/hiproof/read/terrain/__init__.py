@@ -48,13 +48,10 @@ class TerrainChain:
         It has to know at least `minimum` of `xy_world` (n, 2) without guessing (a true `is_guess`).
         """
         for terrain in self.terrains:
-            heights = (
-                np.full(len(xy_world), np.nan)
-                if getattr(terrain, "is_guess", False)
-                else terrain.height_at(xy_world)
-            )
-            if np.isfinite(heights).sum() >= minimum:
-                return heights
+            if not getattr(terrain, "is_guess", False):
+                heights = terrain.height_at(xy_world)
+                if np.isfinite(heights).sum() >= minimum:
+                    return heights
         return np.full(len(xy_world), np.nan)
 
     def heights_and_sources(self, xy_world: np.ndarray) -> tuple[np.ndarray, tuple[str, ...]]:

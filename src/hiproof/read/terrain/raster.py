@@ -257,11 +257,10 @@ def bilinear(
     down, right = row - row0, column - column0
     values = np.stack([take(row0 + i, column0 + j) for i in (0, 1) for j in (0, 1)])
     weights = np.stack([y * x for y in (1 - down, down) for x in (1 - right, right)])
-    mask = np.isfinite(values)
-    weights, values = np.where(mask, weights, 0.0), np.where(mask, values, 0.0)
+    is_unknown = ~np.isfinite(values)
+    weights[is_unknown] = values[is_unknown] = 0.0
     total = weights.sum(axis=0)
-    has_any = total > 1e-9
-    return np.where(has_any, (weights * values).sum(axis=0) / np.where(has_any, total, 1.0), np.nan)
+    return (weights * values).sum(axis=0) / np.where(total > 1e-9, total, np.nan)
 
 
 def import_rasterio() -> Any:
