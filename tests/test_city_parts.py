@@ -72,8 +72,7 @@ def test_ground_heights_equal_plain_weighted_planes(share):
         ground_cells(sloped_ground(rng, int(4000 * share))),
         np.array([20.0, 25.0, 60.0, 70.0]),
     )
-    is_known = np.isfinite(cells.z)
-    xyz = np.column_stack([cells.x[is_known], cells.y[is_known], cells.z[is_known]])
+    xyz = cells.xyz[np.isfinite(cells.xyz[:, :, 2])]
     xyz = xyz[((np.floor(xyz[:, :2]) >= box[:2]) & (np.floor(xyz[:, :2]) < box[2:])).all(axis=1)]
     for place in rng.uniform(15, 75, (60, 2)):
         steps = np.abs(np.floor(xyz[:, :2]) - np.floor(place)).max(axis=1)

@@ -21,9 +21,10 @@ from click.testing import CliRunner
 import hiproof
 from handmade import courtyard, gable_house, make_building, make_lost_building
 from hiproof.city.folder.marks import (
+    RESULT,
+    SELECTION,
     compute_mark,
-    describe_inputs,
-    describe_selection,
+    describe,
     file_stamps,
     hold_folder,
 )
@@ -66,8 +67,8 @@ def other(value):
 
 
 def mark(request):
-    return compute_mark(describe_inputs(request), "salt"), compute_mark(
-        describe_selection(request), "salt"
+    return compute_mark(describe(request, RESULT), "salt"), compute_mark(
+        describe(request, SELECTION), "salt"
     )
 
 
@@ -91,9 +92,8 @@ def test_every_setting_is_in_the_mark(section):
             values, **{declared.name: other(getattr(values, declared.name))}
         )
         settings = dataclasses.replace(Settings(), **{section: changed})
-        assert describe_inputs(dataclasses.replace(REQUEST, settings=settings)) != describe_inputs(
-            REQUEST
-        ), declared.name
+        request = dataclasses.replace(REQUEST, settings=settings)
+        assert describe(request, RESULT) != describe(REQUEST, RESULT), declared.name
 
 
 def leaves(value, name=""):

@@ -3,7 +3,16 @@
 from enum import Enum
 
 
-class Status(Enum):
+class Coded(Enum):
+    """Values with a sentence each."""
+
+    @property
+    def code(self) -> str:
+        """Stable lower-case name for files, tables and options."""
+        return self.name.lower()
+
+
+class Status(Coded):
     """Outcome of one building. `is_model` tells whether a solid exists."""
 
     MODELLED = "modelled"
@@ -29,26 +38,16 @@ class Status(Enum):
     def is_model(self) -> bool:
         return not self.value.startswith("no model")
 
-    @property
-    def code(self) -> str:
-        """Stable lower-case name for files and tables."""
-        return self.name.lower()
 
-
-class Grade(Enum):
+class Grade(Coded):
     """How good a model is, told from its points (evaluate/verdict.py)."""
 
     GOOD = "the roof looks right over its points"
     FAIR = "a part of the roof does not fit its points"
     POOR = "look at the building before you use it"
 
-    @property
-    def code(self) -> str:
-        """Stable lower-case name for files and tables."""
-        return self.name.lower()
 
-
-class Doubt(Enum):
+class Doubt(Coded):
     """The doubts that a building's detail may name, by the words that a run counts."""
 
     TWO_SURFACES = "points lie on two surfaces"
@@ -71,10 +70,10 @@ class Doubt(Enum):
 
     @property
     def told(self) -> str:
-        return self.name.lower().replace("_", " ")
+        return self.code.replace("_", " ")
 
 
-class Change(Enum):
+class Change(Coded):
     """What became of a building between two surveys."""
 
     UNCHANGED = "the new points lie on the earlier roof"
@@ -84,13 +83,8 @@ class Change(Enum):
     NOT_COVERED = "the new survey hardly covers the building, or a part of it"
     UNCERTAIN = "the new points neither confirm nor clearly contradict the earlier roof"
 
-    @property
-    def code(self) -> str:
-        """Stable lower-case name for files."""
-        return self.name.lower()
 
-
-class ChangeKind(Enum):
+class ChangeKind(Coded):
     """What changed of a building."""
 
     ROOF_RAISED = "the whole roof is higher"
@@ -114,29 +108,19 @@ class ChangeKind(Enum):
     DEMOLISHED = "the building was demolished"
     BUILT = "the building was built"
 
-    @property
-    def code(self) -> str:
-        """Stable lower-case name for files."""
-        return self.name.lower()
-
 
 # Share of roof points within 0.2 m of the roof, below which a building does not count as modelled:
 # most of its points contradict the model.
 MOSTLY_OFF = 0.5
 
 
-class Attention(Enum):
+class Attention(Coded):
     """Why a person should look at a building; `hiproof edit --only` takes these kinds."""
 
     FAILED = "hiproof failed, or the input of the building is unusable"
     DOUBTFUL = "the model contradicts its points, or stands on too few of them"
     NO_POINTS = "no usable points inside the footprint"
     CHANGED = "the building seems to have changed since its footprint was drawn"
-
-    @property
-    def code(self) -> str:
-        """Stable lower-case name for files and options."""
-        return self.name.lower()
 
 
 ATTENTION_OF_STATUS = {

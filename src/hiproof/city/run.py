@@ -157,7 +157,7 @@ def reconstruct_in_folder(
         clock.lap("solve")
         if ledger.get("merged") != "yes":
             merge(plan, steps.make_head(plan), state, ledger, progress)
-        remove_bundles(Path(request.out), ledger.failed_ids())
+        remove_bundles(Path(request.out), dict(ledger.failures(-1)))
         summary = summarise(request, plan, ledger, clock)
         LOGGER.info(
             "%s: %s; seconds: %s",
@@ -265,14 +265,17 @@ def write_run_record(request: Request, plan: WorkPlan, summary: Summary) -> None
         "summary": summary.overview.to_dict(),
         **{name: getattr(summary, name) for name in RESULTS},
     }
+    save_record(request, record)
+
+
+def save_record(request: Request, record: dict[str, Any]) -> None:
     save_text(Path(request.out) / "run.json", json.dumps(masked_values(record), indent=1) + "\n")
 
 
 def extend_run_record(request: Request, entries: dict[str, Any]) -> None:
     """Add entries to the run.json that a run has written."""
-    path = Path(request.out) / "run.json"
-    record = json.loads(path.read_text(encoding="utf-8")) | entries
-    save_text(path, json.dumps(masked_values(record), indent=1) + "\n")
+    text = (Path(request.out) / "run.json").read_text(encoding="utf-8")
+    save_record(request, json.loads(text) | entries)
 
 
 def clean(state: Path, ledger: Ledger) -> None:

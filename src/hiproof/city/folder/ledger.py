@@ -304,15 +304,10 @@ class Ledger:
         )
         return Overview.of(map(BuildingOutcome._make, rows))
 
-    def failed_ids(self) -> list[str]:
-        """Return the ids of all buildings that hit an internal error."""
-        sql = "select id from building where status = 'internal_error'"
-        return [id for (id,) in self.run(sql)]
-
-    def failures(self) -> list[Failure]:
-        """Return the first 20 buildings that hit an internal error."""
+    def failures(self, most: int = 20) -> list[Failure]:
+        """Return the first buildings that hit an internal error, all of them for -1."""
         sql = (
             "select id, detail from building where status = 'internal_error' order by position "
-            "limit 20"
+            "limit ?"
         )
-        return list(map(Failure._make, self.run(sql)))
+        return list(map(Failure._make, self.run(sql, most)))

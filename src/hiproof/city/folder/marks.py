@@ -23,43 +23,40 @@ from typing import Any
 from ... import __version__
 from ...errors import OutputError
 from ...masking import masked_values
-from ..request import Request
+from ..request import WHICH, Request
 
 # parts of one file that formats keep beside it
 SIDECAR_ENDINGS = (".dbf", ".shx", ".prj", ".cpg", ".tfw")
 APPENDED = ("-wal", ".aux.xml", ".ovr", ".msk")
+RESULT, SELECTION = "the result", WHICH["decides"]  # what fields of a request decide
 SHOWN_FILES = 3  # of an input that differs: enough to know which delivery was replaced
 
 
-def describe_inputs(request: Request) -> dict[str, Any]:
-    """Return all that decides the result of a building by name: values, and stamps of files."""
-    return {"version": __version__} | dict(named_values("", request, "the result"))
+def describe(request: Request, decides: str) -> dict[str, Any]:
+    """Return by name all that decides the RESULT of a building, or the SELECTION of buildings.
 
-
-def describe_selection(request: Request) -> dict[str, Any]:
-    """Return all that decides which buildings there are, as `describe_inputs` does."""
-    return dict(named_values("", request, "which buildings"))
+    These are values, and stamps of files.
+    """
+    return {"version": __version__} | dict(named_values("", request, decides))
 
 
 def named_values(name: str, value: Any, decides: str) -> Iterator[tuple[str, Any]]:
     """Yield (name, JSON value) of each deciding leaf of a dataclass.
 
-    `decides` is in the leaf's declaration; the names of fields in fields are joined by dots.
+    `decides` is in the leaf's declaration; the names of fields in fields are joined by dots. `name`
+    is what they begin with.
 
     What stands at a path counts of leaves that are declared to name files alone: any word may be
     the name of a folder, too.
     """
     for declared in dataclasses.fields(value):
-        if declared.metadata.get("decides", "the result") == decides:
-            inner = f"{name}.{declared.name}" if name else declared.name
-            result = getattr(value, declared.name)
+        if declared.metadata.get("decides", RESULT) == decides:
+            inner, result = name + declared.name, getattr(value, declared.name)
             if dataclasses.is_dataclass(result):
-                yield from named_values(inner, result, decides)
+                yield from named_values(f"{inner}.", result, decides)
             else:
-                yield (
-                    inner,
-                    with_files(result) if declared.metadata.get("names") == "files" else result,
-                )
+                is_path = declared.metadata.get("names") == "files"
+                yield inner, with_files(result) if is_path else result
 
 
 def with_files(value: Any) -> Any:

@@ -32,7 +32,7 @@ from ..request import Request
 from ..work.bundle_folders import remove_bundles
 from ..work.noted import NOTED_FOLDER
 from .ledger import Ledger
-from .marks import compute_mark, describe_inputs, describe_selection, find_changed_files
+from .marks import RESULT, SELECTION, compute_mark, describe, find_changed_files
 
 LEDGER_BYTES = 200_000  # of an empty one with its journal; where less is free that is what ails it
 
@@ -41,9 +41,8 @@ def open_state(out: Path) -> Path:
     """Return the run's own folder inside the output folder, and make it if need be."""
     state = Path(out) / STATE_FOLDER
     try:
-        state.mkdir(parents=True, exist_ok=True)
-        (state / TEXTS_FOLDER).mkdir(exist_ok=True)
-        (state / "points").mkdir(exist_ok=True)
+        for name in (TEXTS_FOLDER, "points"):
+            (state / name).mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError(
             f"expected a folder that can be written at {out}, got: {error}; choose another --out"
@@ -96,7 +95,7 @@ def resume_or_plan(
     where footprints or overrides changed since, and the others are to be solved.
     """
     goes_on = not request.restart and is_resumable(request, ledger)
-    chosen = compute_mark(describe_selection(request), ledger.get("salt") or "")
+    chosen = compute_mark(describe(request, SELECTION), ledger.get("salt") or "")
     is_planned = goes_on and ledger.get("choice") == chosen
     plan = WorkPlan.load(state / PLAN_FILE) if goes_on else None
     if plan is not None:
@@ -134,7 +133,7 @@ def is_resumable(request: Request, ledger: Ledger) -> bool:
 
     Raises OutputError for another's.
     """
-    inputs = describe_inputs(request)
+    inputs = describe(request, RESULT)
     is_of = ledger.get("mark") == compute_mark(inputs, ledger.get("salt") or "")
     # a run that ended before any task was done, by a wrong setting, is nothing to keep
     is_begun = any(task.state == "done" for task in ledger.tasks())
@@ -186,11 +185,11 @@ def settle(
 
 def enter(request: Request, ledger: Ledger) -> None:
     """Enter whose run it is, which makes it one to go on from."""
-    inputs, salt = describe_inputs(request), secrets.token_hex(16)
+    inputs, salt = describe(request, RESULT), secrets.token_hex(16)
     text = json.dumps(masked_values(inputs), default=str)
     marks = {
         "mark": compute_mark(inputs, salt),
-        "choice": compute_mark(describe_selection(request), salt),
+        "choice": compute_mark(describe(request, SELECTION), salt),
     }
     ledger.set(inputs=text, salt=salt, merged="no", **marks)
 
@@ -242,8 +241,10 @@ def keep_edited(out: Path, broken: list[str]) -> str:
     path = Path(out) / PARAMETERS
     if PARAMETERS not in broken or not path.exists():
         return ""
-    names = (path.with_name(f"{path.stem}.edited-{n}{path.suffix}") for n in itertools.count(1))
-    kept = next(name for name in names if not name.exists())
+    for number in itertools.count(1):
+        kept = path.with_name(f"{path.stem}.edited-{number}{path.suffix}")
+        if not kept.exists():
+            break
     path.rename(kept)
     return f", and the changed {PARAMETERS} is kept as {kept.name}"
 
@@ -275,37 +276,28 @@ def list_buildings(
 ) -> Iterator[tuple[int, str, bytes]]:
     """Yield the position, the work tile and the digest of each building of a plan.
 
-    `overrides` are those of its buildings by position.
+    The digest is of what a building's texts depend on, but for the points. `overrides` are those of
+    its buildings by position.
     """
     common = [plan.settings.to_dict(), plan.crs_wkt, plan.translate.tolist(), plan.around_m]
     shared = make_digest(common).hex()
     for tile, members in plan.tiles.items():
         for index in members:
-            yield index, tile, digest_building(plan, index, shared, overrides.get(index))
-
-
-def digest_building(
-    plan: WorkPlan, index: int, shared: str, override: dict[str, Any] | None
-) -> bytes:
-    """Return a digest of what a building's texts depend on, but for the points.
-
-    `shared` is that of what all texts of the plan have in common.
-    """
-    job = plan.jobs[index]
-    row = plan.outlines.row(index) if plan.moves_rows else []
-    neighbours = plan.outlines.select_near(index, plan.beyond_m) if plan.beyond_m else []
-    inputs = [
-        shared,
-        job.id,
-        job.area.wkb_hex,
-        job.footprint.attributes if job.footprint else None,
-        plan.list_names(job),
-        [polygon.wkb_hex for polygon in row],
-        encode_passages(job),
-        [polygon.wkb_hex for polygon in neighbours],
-        override,
-    ]
-    return make_digest(inputs)
+            job = plan.jobs[index]
+            row = plan.outlines.row(index) if plan.moves_rows else []
+            neighbours = plan.outlines.select_near(index, plan.beyond_m) if plan.beyond_m else []
+            inputs = [
+                shared,
+                job.id,
+                job.area.wkb_hex,
+                job.footprint.attributes if job.footprint else None,
+                plan.list_names(job),
+                [polygon.wkb_hex for polygon in row],
+                encode_passages(job),
+                [polygon.wkb_hex for polygon in neighbours],
+                overrides.get(index),
+            ]
+            yield index, tile, make_digest(inputs)
 
 
 def make_digest(values: list) -> bytes:

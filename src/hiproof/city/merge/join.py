@@ -9,6 +9,7 @@ import functools
 import hashlib
 import re
 from collections.abc import Callable, Iterable, Iterator
+from itertools import chain, starmap
 from pathlib import Path
 
 from ...formats import (
@@ -46,21 +47,18 @@ def merge(
             leftover.unlink(missing_ok=True)
     remove_tiles(out, ".*")
 
-    def iterate_fragments() -> Iterator[Fragments]:
-        for number, tile in enumerate(plan.tiles):
-            progress("merge", number, len(plan.tiles))
-            yield from load_texts(state, ledger.texts(tile))
+    def load(number: int, tile: str) -> Iterator[Fragments]:
+        progress("merge", number, len(plan.tiles))
+        return load_texts(state, ledger.texts(tile))
 
-    join_fragments(list_requested_files(plan.settings, out), iterate_fragments(), head)
+    parts = chain.from_iterable(starmap(load, enumerate(plan.tiles)))
+    join_fragments(list_requested_files(plan.settings, out), parts, head)
 
 
 def load_texts(state: Path, places: Iterable[tuple[str, int]]) -> Iterator[Fragments]:
     """Load the texts of buildings, of which files and numbers there are known."""
-    loaded = functools.lru_cache(maxsize=8)(
-        lambda file: list(load_fragments(state / TEXTS_FOLDER / file))
-    )
-    for file, number in places:
-        yield loaded(file)[number]
+    load = functools.lru_cache(maxsize=8)(lambda file: list(load_fragments(file)))
+    return (load(state / TEXTS_FOLDER / file)[number] for file, number in places)
 
 
 def list_text_files(state: Path, tile: str) -> list[Path]:
@@ -85,11 +83,8 @@ def list_output_files(plan: WorkPlan, out: Path) -> list[Path]:
     The record of the run is left out.
     """
     tiles = (list_requested_tile_files(plan.settings, out / TILE_FOLDER, t) for t in plan.tiles)
-    return [
-        file
-        for files in (list_requested_files(plan.settings, out), *tiles)
-        for file in files.values()
-    ]
+    files = chain([list_requested_files(plan.settings, out)], tiles)
+    return list(chain.from_iterable(map(dict.values, files)))
 
 
 def write_tile(plan: WorkPlan, state: Path, tile: str, places: Iterable[tuple[str, int]]) -> None:
@@ -109,8 +104,8 @@ def remove_tiles(out: Path, pattern: str = "*") -> None:
             file.unlink(missing_ok=True)
 
 
-CHUNK_BYTES = 1 << 20  # bytes read at once: a file of any size is digested in little memory
 SQLITE = b"SQLite format 3\0"
+SQLITE_HEAD_BYTES = 100
 # bytes of an SQLite file's head that change when a viewer opens it: how it is locked, and counters
 # of that
 RESTLESS = ((18, 20), (24, 28), (92, 100))
@@ -140,13 +135,10 @@ def broken_claims(claims: Iterable[Claim], out: Path) -> list[str]:
 
 def digest(file: Path) -> str:
     """Return the SHA-256 of a file's content."""
-    sha = hashlib.sha256()
     with open(file, "rb") as content:
-        head = bytearray(content.read(CHUNK_BYTES))
+        head = bytearray(content.read(SQLITE_HEAD_BYTES))
         if head.startswith(SQLITE):
             for start, end in RESTLESS:
                 head[start:end] = bytes(end - start)
-        sha.update(head)
-        while chunk := content.read(CHUNK_BYTES):
-            sha.update(chunk)
-    return sha.hexdigest()
+        sha = hashlib.sha256(head)
+        return hashlib.file_digest(content, lambda: sha).hexdigest()

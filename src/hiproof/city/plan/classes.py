@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
 import warnings
 from collections import Counter
-from typing import Any
 
 import numpy as np
 
@@ -42,9 +40,7 @@ def settle_classes(clouds: tuple[str, ...], settings: Settings) -> Settings:
     # with scipy.ndimage: not where the clouds have a building class
     from ...classify.buildings import NO_ROOFS
 
-    selected_counts = tuple(
-        sorted(c for c in counts if c not in NO_ROOFS and c not in read.ground_classes)
-    )
+    selected_counts = sorted(counts.keys() - {*NO_ROOFS, *read.ground_classes})
     present = ", ".join(f"{c} ({count_things(n, 'point')})" for c, n in sorted(counts.items()))
     if not selected_counts:
         raise InputError(
@@ -59,15 +55,8 @@ def settle_classes(clouds: tuple[str, ...], settings: Settings) -> Settings:
             f"{', '.join(map(str, selected_counts))}; say otherwise with --building-class",
             InputWarning,
         )
-    return choose_classes(
-        settings,
-        roofs="shape" if read.roofs == "auto" else read.roofs,
-        building_classes=selected_counts,
-    )
-
-
-def choose_classes(settings: Settings, **changes: Any) -> Settings:
-    return dataclasses.replace(settings, read=dataclasses.replace(settings.read, **changes))
+    roofs = "shape" if read.roofs == "auto" else read.roofs
+    return settings.replace({"read": {"roofs": roofs, "building_classes": selected_counts}})
 
 
 def count_classes(clouds: tuple[str, ...], is_enough: tuple[int, ...]) -> Counter[int]:

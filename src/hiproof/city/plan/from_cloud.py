@@ -14,7 +14,6 @@ from ...model import PointCloud
 from ...read.points.pointcloud import PointFileHeader, iter_points, list_boxes, read_points
 from ...settings import Settings
 from ..request import Request
-from .classes import choose_classes
 from .work_plan import Job
 
 MOST_BLOCK_M = 250.0
@@ -50,7 +49,7 @@ def jobs_from_cloud(
         roofs = count_things(len(buildings), "roof") if len(buildings) > 1 else "one roof"
         text = f"taken for the points of {roofs}, as nothing in it looks like ground"
         warn(", ".join(cloud.sources), text)
-        settings = choose_classes(settings, roofs="alone")
+        settings = settings.replace({"read": {"roofs": "alone"}})
     return tuple(
         Job(i, item.id, item.area, None, item.error) for i, item in enumerate(buildings)
     ), settings

@@ -1,8 +1,6 @@
 """Footprints of an Overture Maps release, kept as a GeoPackage and read like any file.
 
 Overture deletes its old releases, so that what a run was made from is only known where it is kept.
-
-Overture deletes its old releases, so that what a run was made from is only known where it is kept.
 """
 
 from __future__ import annotations
@@ -23,7 +21,7 @@ from ...masking import masked_values
 from ...read.crs import make_transformer, names_place, parse_crs
 from ...read.outlines.overture import TYPES, OvertureFootprints, is_overture, read_overture
 from ...read.points.pointcloud import PointFileHeader, common_crs
-from ...write.files import atomic
+from ...write.files import STATE_FOLDER, atomic
 from ..request import Request
 from .frame import plan_bounds
 
@@ -41,19 +39,15 @@ def with_overture(request: Request, headers: list[PointFileHeader]) -> Request:
     """Return `request` with Overture's footprints fetched and kept in the run's own folder."""
     if not is_overture(request.footprints):
         return request
-    path = kept_file(request.out)
-    keep_footprints(request, headers, path)
-    return dataclasses.replace(request, footprints=str(path), layer=None)
-
-
-def kept_file(out: Path) -> Path:
-    """Return the path of the footprints that a run in `out` fetches."""
-    return Path(out) / ".hiproof" / KEPT_FILE
+    path = choose_footprints(request)
+    keep_footprints(request, headers, Path(str(path)))
+    return dataclasses.replace(request, footprints=path, layer=None)
 
 
 def choose_footprints(request: Request) -> str | None:
-    """Return the footprints of a run: the kept ones, else those it names."""
-    return str(kept_file(request.out)) if is_overture(request.footprints) else request.footprints
+    """Return the footprints of a run: those it fetches and keeps, else those it names."""
+    kept = str(Path(request.out) / STATE_FOLDER / KEPT_FILE)
+    return kept if is_overture(request.footprints) else request.footprints
 
 
 def keep_footprints(request: Request, headers: list[PointFileHeader], path: Path) -> dict[str, Any]:

@@ -36,18 +36,15 @@ LEVELLING = 0.1  # m2: holds the slope back where cells lie on one side only
 
 
 class Cells:
-    """Known cells in world metres as tables `x`, `y`, `z` (rows, columns), NaN without a point."""
+    """Known cells in world metres: a table `xyz` (rows, columns, 3), NaN without a point."""
 
     def __init__(self, xyz: np.ndarray):
-        """Make tables of `xyz` (n, 3), at most one point a cell."""
-        self.low = (
-            np.floor(xyz[:, :2].min(axis=0)).astype(np.int64) if len(xyz) else np.zeros(2, np.int64)
-        )
-        cell = np.floor(xyz[:, :2]).astype(np.int64) - self.low
-        size = cell.max(axis=0) + 1 if len(xyz) else (0, 0)
-        tables = np.full((3, size[1], size[0]), np.nan)
-        tables[:, cell[:, 1], cell[:, 0]] = xyz.T
-        self.x, self.y, self.z = tables
+        """Make the table of `xyz` (n, 3), at most one point a cell."""
+        cell = np.floor(xyz[:, :2]).astype(np.int64)
+        self.low = cell.min(axis=0) if len(cell) else np.zeros(2, np.int64)
+        column, row = (cell - self.low).T
+        self.xyz = np.full((row.max(initial=-1) + 1, column.max(initial=-1) + 1, 3), np.nan)
+        self.xyz[row, column] = xyz
 
     def inside(self, box: np.ndarray) -> np.ndarray:
         """Return the points (m, 3) of known cells inside a whole-metre box.
@@ -58,26 +55,19 @@ class Cells:
             max(int(side) - first, 0)
             for side, first in zip(box, self.low.tolist() * 2, strict=True)
         )
-        mask = np.isfinite(self.z[lower:upper, left:right])
-        return np.column_stack(
-            [table[lower:upper, left:right][mask] for table in (self.x, self.y, self.z)]
-        )
+        xyz = self.xyz[lower:upper, left:right]
+        return xyz[np.isfinite(xyz[:, :, 2])]
 
     def select_around(self, xy: np.ndarray, reach: int, box: np.ndarray) -> np.ndarray:
         """Return cells (n, k, 3) of a box within `reach` of `xy` (n, 2), NaN where no point is."""
-        size = self.z.shape[::-1]
-        steps = np.arange(-reach, reach + 1)
+        row, column = np.indices(2 * (2 * reach + 1,)).reshape(2, -1) - reach
+        cell = np.floor(xy).astype(np.int64)[:, None] + np.column_stack([column, row]) - self.low
         lower = np.maximum(box[:2].astype(np.int64) - self.low, 0)
-        upper = np.minimum(box[2:].astype(np.int64) - self.low, size)
-        cell = np.floor(xy).astype(np.int64)[:, :, None] + steps - self.low[:, None]
-        is_in = (cell >= lower[:, None]) & (cell < upper[:, None])
-        if not is_in.any():
-            return np.full((len(xy), len(steps) ** 2, 3), np.nan)
-        column, row = np.clip(cell, 0, np.array(size)[:, None] - 1).swapaxes(0, 1)
-        place = row[:, :, None], column[:, None, :]
-        around = np.stack([self.x[place], self.y[place], self.z[place]], axis=-1)
-        around[~(is_in[:, 1, :, None] & is_in[:, 0, None, :])] = np.nan
-        return around.reshape(len(xy), -1, 3)
+        upper = np.minimum(box[2:].astype(np.int64) - self.low, self.xyz.shape[1::-1])
+        is_in = ((cell >= lower) & (cell < upper)).all(axis=2)
+        around = np.full(cell.shape[:2] + (3,), np.nan)
+        around[is_in] = self.xyz[cell[is_in, 1], cell[is_in, 0]]
+        return around
 
 
 @dataclass
@@ -106,6 +96,7 @@ class GroundAround:
         return heights
 
 
+@dataclass
 class ModelAround:
     """Terrain for one building where its terrain model has a void, as around houses.
 
@@ -113,9 +104,14 @@ class ModelAround:
     which reach as many squares as cells of ground points do.
     """
 
-    def __init__(self, model: Terrain, box: np.ndarray, step_m: int = 1, is_guess: bool = False):
-        self.model, self.box, self.step_m, self.is_guess = model, box, step_m, is_guess
-        self.source = f"nearest heights of the {model.source}"
+    model: Terrain
+    box: np.ndarray
+    step_m: int = 1
+    is_guess: bool = False
+
+    @property
+    def source(self) -> str:
+        return f"nearest heights of the {self.model.source}"
 
     @functools.cached_property
     def around(self) -> GroundAround:

@@ -10,6 +10,7 @@ import json
 import logging
 from collections.abc import Callable, Iterator
 from contextlib import closing
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -71,25 +72,21 @@ def solve_in_quarantine(
 MOST_LOSSES = 3  # deaths of its process until a task is tried alone: two may be a neighbour's doing
 
 
+@dataclass
 class Queue:
     """The open tasks of a run: point files to sort, and tiles to solve.
 
     `clouds` and `terrain` are what they read.
     """
 
-    def __init__(
-        self,
-        plan: WorkPlan,
-        state: Path,
-        ledger: Ledger,
-        executor: Executor,
-        clouds: tuple[str, ...],
-        terrain: str | None,
-        progress: Progress,
-    ):
-        self.plan, self.state, self.ledger, self.executor = plan, state, ledger, executor
-        self.clouds, self.terrain, self.progress = clouds, terrain, progress
-        self.counted = 0
+    plan: WorkPlan
+    state: Path
+    ledger: Ledger
+    executor: Executor
+    clouds: tuple[str, ...]
+    terrain: str | None
+    progress: Progress
+    counted: int = 0
 
     def work_off(self, kind: str, function: Callable[..., Any]) -> None:
         """Run all open tasks of a kind.

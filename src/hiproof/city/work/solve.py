@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import shapely
@@ -116,33 +116,27 @@ class Surroundings:
 
     def without_moving(self) -> Surroundings:
         """Return the same surroundings, where footprints stay in place."""
-        result = self.share_cells()
-        result.plan = dataclasses.replace(self.plan, settings=self.settings)
-        return result
+        return self.replace(plan=dataclasses.replace(self.plan, settings=self.settings))
 
     def without_model(self) -> Surroundings:
         """Return the same surroundings without their terrain model."""
-        result = self.share_cells()
-        result.model = None
-        return result
+        return self.replace(model=None)
 
-    def share_cells(self) -> Surroundings:
-        """Return a copy with the cells of this one: a copy would find its own, again and again."""
+    def replace(self, **changes: Any) -> Surroundings:
+        """Return a copy with these cells: a copy would find its own, again and again."""
         _ = self.ground, self.low
-        return copy.copy(self)
+        result = copy.copy(self)
+        vars(result).update(changes)
+        return result
 
     def find_row_shift(self, job: Job) -> Shift:
         """Return the shift of a job's area from its roof, that of its whole row."""
-        row = (
-            self.plan.outlines.row(job.index)
-            if self.plan.moves_rows and not job.area.is_empty
-            else []
-        )
-        if not row:
+        outlines = self.plan.outlines
+        if not self.plan.moves_rows or job.area.is_empty or not outlines.row(job.index):
             return Shift()
-        label = int(self.plan.outlines.labels[job.index])
+        label = int(outlines.labels[job.index])
         if label not in self.shifts:
-            outline = row_outline(row)
+            outline = row_outline(outlines.row(job.index))
             origin = np.floor(outline.bounds[:2])
             nearby = distinct(self.take_near(outline))
             self.shifts[label] = find_shift(
@@ -158,14 +152,14 @@ class Surroundings:
         shift = self.find_row_shift(job)
         if job.footprint is None:
             return job, ""
-        remark = shift_remark(
-            shift, len(self.plan.outlines.row(job.index)) if shift.is_clear else 1
-        )
         if not shift.is_clear:
-            return job, remark
-        x, y = (round(float(value), 3) for value in shift.xy)
-        whole = round(job.footprint.shift[0] + x, 3), round(job.footprint.shift[1] + y, 3)
-        return make_job(job.index, job.footprint, whole), remark
+            return job, shift_remark(shift, 1)
+        x, y = (
+            round(old + round(float(new), 3), 3)
+            for old, new in zip(job.footprint.shift, shift.xy, strict=True)
+        )
+        remark = shift_remark(shift, len(self.plan.outlines.row(job.index)))
+        return make_job(job.index, job.footprint, (x, y)), remark
 
     def select_roof_points(self, job: Job) -> FoundRoof:
         """Return the roof points (n, 3) inside the job's area, or near it.
@@ -312,12 +306,9 @@ class Surroundings:
         if points is None:
             return building
         if building.status is Status.NO_POINTS:
-            missing_points = explain_missing_points(
-                points, self.plan.settings.read.building_classes
-            )
-            return (
-                dataclasses.replace(building, detail=missing_points) if missing_points else building
-            )
+            classes = self.plan.settings.read.building_classes
+            detail = explain_missing_points(points, classes) or building.detail
+            return dataclasses.replace(building, detail=detail)
         return add_remark(
             building, remark_other_classes(points, roof), ground_under_roof(points, roof)
         )

@@ -15,6 +15,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -91,19 +92,14 @@ class Reaches:
         lower, upper = bounds[:, :2], bounds[:, 2:]
         self.roof_boxes, reach_m = plan.roof_boxes, plan.terrain_reach_m
         self.terrain_boxes = np.hstack([np.floor(lower - reach_m), np.ceil(upper + reach_m)])
-        has_area = np.isfinite(bounds[:, 0])
         self.is_partial = only is not None
-        tiles = plan.tiles if only is None else only
-        members = {tile: [i for i in own_items if has_area[i]] for tile, own_items in tiles.items()}
-        self.members = {tile: own_items for tile, own_items in members.items() if own_items}
+        self.members = {
+            tile: with_area
+            for tile, members in (plan.tiles if only is None else only).items()
+            if (with_area := [i for i in members if not plan.jobs[i].area.is_empty])
+        }
         self.names = list(self.members)
-        boxes = [
-            np.vstack([self.terrain_boxes[own_items], self.roof_boxes[own_items]])
-            for own_items in self.members.values()
-        ]
-        self.bounds = np.array(
-            [[*b[:, :2].min(axis=0), *b[:, 2:].max(axis=0)] for b in boxes]
-        ).reshape(-1, 4)
+        self.bounds = np.array([self.of(tile).bounds for tile in self.names]).reshape(-1, 4)
         self.tree = shapely.STRtree(shapely.box(*self.bounds.T))
 
     def near(self, box: Iterable[float]) -> np.ndarray:
@@ -253,8 +249,7 @@ def wanted_points(
     if file_kind(path) != "las":
         return iter_points(path, units=units)
     header = read_header(path)
-    west, south, _, east, north, _ = header.bounds
-    box = units.to_metres(np.array([west, south, east, north]))
+    box = units.to_metres(np.array(header.bounds)[[0, 1, 3, 4]])
     if is_whole:
         return iter_points(path, units=units, noted=None if is_copc(path) else result)
     if reaches.is_partial and np.isfinite(box).all() and not len(reaches.near(box)):
@@ -275,26 +270,21 @@ def points_by_squares(path: str, reaches: Reaches, units: Units) -> Iterator[Poi
     their common borders are decoded twice. A point on a border may come twice, as in files that
     overlap.
     """
-    (xmin, ymin), (xmax, ymax) = units.to_metres(
-        np.reshape(read_header(path).bounds, (2, 3))[:, :2]
-    )
-    bounds = reaches.bounds[reaches.near((xmin, ymin, xmax, ymax))]
-    corners = np.floor(
-        np.clip(bounds, (xmin, ymin, xmin, ymin), (xmax, ymax, xmax, ymax)) / QUERY_M
-    ).astype(np.int64)
-    columns_and_rows = {
-        (column, row)
-        for left, lower, right, upper in corners.tolist()
-        for column in range(left, right + 1)
-        for row in range(lower, upper + 1)
+    box = units.to_metres(np.reshape(read_header(path).bounds, (2, 3))[:, :2])
+    bounds = reaches.bounds[reaches.near(box.ravel())].reshape(-1, 2, 2)
+    corners = np.floor(np.clip(bounds, *box) / QUERY_M).astype(np.int64)
+    squares = {
+        square
+        for (left, lower), (right, upper) in corners.tolist()
+        for square in product(range(left, right + 1), range(lower, upper + 1))
     }
-    for column, row in sorted(columns_and_rows):
+    for column, row in sorted(squares):
         square = QUERY_M * np.array([column, row, column + 1, row + 1])
         nearby = reaches.bounds[reaches.near(square)]
         if len(nearby):
             lower, upper = nearby[:, :2].min(axis=0), nearby[:, 2:].max(axis=0)
-            box = (*np.maximum(square[:2], lower), *np.minimum(square[2:], upper))
-            yield from iter_points(path, box=box, units=units)
+            part = (*np.maximum(square[:2], lower), *np.minimum(square[2:], upper))
+            yield from iter_points(path, box=part, units=units)
 
 
 def load_points(root: Path, tile: str, epoch: str = "") -> dict[str, np.ndarray]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -14,20 +15,17 @@ from .solve import Surroundings
 from .sort import POINT_KINDS, load_points
 
 
+@dataclass
 class SurveyPoints:
     """The points of some surveys in a work tile, by name, alone and together.
 
     `points` (n, 3) are those of each survey by kind, the newest first.
     """
 
-    def __init__(
-        self,
-        points: dict[str, dict[str, np.ndarray]],
-        terrain: RasterTerrain | None,
-        plan: WorkPlan,
-    ):
-        self.points, self.terrain, self.plan = points, terrain, plan
-        self.views: dict[tuple[str, ...], Surroundings] = {}
+    points: dict[str, dict[str, np.ndarray]]
+    terrain: RasterTerrain | None
+    plan: WorkPlan
+    views: dict[tuple[str, ...], Surroundings] = field(default_factory=dict)
 
     @staticmethod
     def load(
