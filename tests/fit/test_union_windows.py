@@ -6,7 +6,7 @@ import shapely
 
 from hiproof import reconstruct
 from hiproof.compose import check_solid
-from hiproof.fit.layout.blocks import BLOCK_M2, HeightRaster, find_cheapest_cut
+from hiproof.fit.layout.blocks import BLOCK_M2, HeightRaster, find_cheapest_cut, find_step
 from hiproof.fit.layout.plan import lay_out_plan
 from hiproof.fit.layout.whole import lay_out_whole
 from hiproof.fit.roof import fit_building
@@ -101,6 +101,18 @@ def test_a_cut_falls_on_a_step_and_blocks_are_small():
     step = whole.plan.frame.to_plan(np.array([[8.0, 7.5, 6.0]]))[0]
     assert outline.area > BLOCK_M2
     assert positions == pytest.approx(step[axis], abs=2 * raster.pitch)
+
+
+def test_a_cut_stays_in_its_box():
+    """A step beside the box drew the cut out of it, and the whole building failed."""
+    outline = shapely.box(0, 0, 40, 20)
+    whole = make_whole(lambda x, y: 6.0 + 9.0 * (x > 20.5) + 0.0 * y, outline, density=1.0)
+    axis = int(np.argmax(np.ptp(whole.plan.uvz[:2], axis=1)))
+    middle = float(np.mean(whole.box[2 * axis : 2 * axis + 2]))
+    for half in whole.box.split(axis, middle):
+        first, last = half[2 * axis : 2 * axis + 2]
+        for place in (first + 0.5, last - 0.5):
+            assert first < find_step(whole, half, axis, place, 1.2) < last
 
 
 def test_equal_levels_of_a_long_row_are_equal_everywhere():

@@ -70,9 +70,9 @@ def find_step(whole: Whole, box: Box, axis: int, place: float, pitch: float) -> 
 
     The squares of heights about their means on both sides have the least sum there.
     """
-    strip = box.split(axis, place + 2 * pitch)[0].split(axis, place - 2 * pitch)[1]
-    numbers = whole.find_points(strip)
-    x, z = whole.plan.uvz[[axis, 2]][:, numbers]
+    x, z = whole.plan.uvz[[axis, 2]][:, whole.find_points(box)]
+    is_near = np.abs(x - place) <= 2 * pitch
+    x, z = x[is_near], z[is_near]
     order = np.argsort(x, kind="stable")
     x, z = x[order], z[order]
     if len(x) < 2:
