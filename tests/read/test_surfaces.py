@@ -124,6 +124,15 @@ def test_layers_that_pyogrio_refuses_are_read(tmp_path, declared):
         read_footprints(path, layer="b")
 
 
+@pytest.mark.filterwarnings("ignore::hiproof.errors.InputWarning")
+def test_an_odd_attribute_of_a_refused_layer_is_text(tmp_path):
+    path = write(tmp_path / "a.gpkg", "TIN", surface(TIN, TRIANGLE, triangles(body(SQUARE))))
+    with open_geopackage(path) as base:
+        base.execute("update a set id = cast(x'41ff42' as text)")
+    (footprint,) = read_footprints(path)
+    assert footprint.attributes["id"] == "A\ufffdB"
+
+
 def test_one_refused_layer_among_others_is_listed(tmp_path):
     path = write(tmp_path / "a.gpkg", "TIN", surface(TIN, TRIANGLE, triangles(body(SQUARE))))
     write_layer(path, [shapely.box(0, 0, 5, 5)], crs="EPSG:32633", layer="sheds", append=True)

@@ -82,22 +82,23 @@ def surface_at(number: Any, surfaces: list[Any]) -> dict[str, Any]:
     return semantics
 
 
-def require_list(value: Any, subject: str) -> list[Any]:
-    if not isinstance(value, list):
+def require(value: Any, kind: type, subject: str) -> Any:
+    if not isinstance(value, kind):
         raise ValueError(f"{excerpt(value)} as {subject}")
     return value
 
 
+def require_list(value: Any, subject: str) -> list[Any]:
+    return require(value, list, subject)
+
+
 def read_geometries(city_object: Any) -> list[dict[str, Any]]:
     """Read the geometries of a city object, each an object of its own."""
-    if not isinstance(city_object, dict):
-        raise ValueError(f"{excerpt(city_object)} as a city object")
+    require(city_object, dict, "a city object")
     result = require_list(city_object.get("geometry") or [], "its geometries")
     for geometry in result:
-        if not isinstance(geometry, dict):
-            raise ValueError(f"{excerpt(geometry)} as a geometry")
-        if not isinstance(geometry.get("semantics") or {}, dict):
-            raise ValueError(f"{excerpt(geometry['semantics'])} as semantics")
+        require(geometry, dict, "a geometry")
+        require(geometry.get("semantics") or {}, dict, "semantics")
     return result
 
 
@@ -157,9 +158,7 @@ def features(
             first_name, units = name, crs_units or find_named_units(name, alternative)
         try:
             transform = read_transform(document) or transform
-            objects = document.get("CityObjects")
-            if not isinstance(objects, dict):
-                raise ValueError(f"{excerpt(objects)} as its CityObjects")
+            objects = require(document.get("CityObjects"), dict, "its CityObjects")
             yield Feature(objects, world_vertices(document, transform, units), place, units)
         except UNUSABLE as error:
             damage = InputError(
@@ -175,8 +174,7 @@ def read_transform(document: dict[str, Any]) -> tuple[np.ndarray, np.ndarray] | 
     transform = document.get("transform")
     if transform is None:
         return None
-    if not isinstance(transform, dict):
-        raise ValueError(f"{excerpt(transform)} as its transform")
+    require(transform, dict, "its transform")
     scale, translate = (read_vertices([transform.get(name)])[0] for name in ("scale", "translate"))
     if not (np.isfinite(scale).all() and is_plausible(translate[None]).all()):
         raise ValueError(f"a transform to no place on Earth ({excerpt(transform)})")

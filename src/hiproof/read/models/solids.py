@@ -11,6 +11,7 @@ footprint (LoD 0); that it is rarely closed is for the check to say.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -195,13 +196,10 @@ def find_citygml_crs(path: Path) -> str | None:
     from lxml import etree
 
     tags = ("{*}Envelope", *MEMBERS)
-    try:
-        for _, element in etree.iterparse(
-            str(path), events=("start",), tag=tags, resolve_entities=False
-        ):
-            return element.get("srsName")
-    except (etree.XMLSyntaxError, OSError):
-        return None  # who reads the solids says what is wrong
+    # who reads the solids says what is wrong
+    with suppress(etree.XMLSyntaxError, OSError, StopIteration):
+        events = etree.iterparse(str(path), events=("start",), tag=tags, resolve_entities=False)
+        return next(events)[1].get("srsName")
     return None
 
 
@@ -250,13 +248,13 @@ def gml_shells(solid: Any, polygons: dict[str | None, Any], place: str) -> list[
         for element in boundary.iter():
             reference = element.get(XLINK_HREF)
             if reference is not None:
-                if reference.lstrip("#") not in polygons:
+                element = polygons.get(reference.lstrip("#"))
+                if element is None:
                     raise InputError(
                         f"expected a polygon with id {reference} among the surfaces of {place}, "
                         "got none; the solid refers to a surface that is missing"
                     )
-                members.append(polygons[reference.lstrip("#")])
-            elif local_name(element) == "Polygon":
+            if local_name(element) == "Polygon":
                 members.append(element)
         shells.append(polygons_solid(members, place, inward=local_name(boundary) == "interior"))
     return shells
