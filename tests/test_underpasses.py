@@ -115,11 +115,18 @@ def test_a_layer_of_passages_is_below_the_houses_it_meets(town_with_gates, tmp_p
     ] == passages
 
 
-def test_a_layer_below_no_house_is_named(town_with_gates, tmp_path):
+@pytest.mark.parametrize(
+    ("corners", "found"),
+    [([(-50, -50)], "none of"), ([(12, 11), (22, 14), (-50, -50)], "1 of 2 in")],
+)
+def test_passages_below_no_house_are_named(corners, found, town_with_gates, tmp_path):
+    """Those beyond all houses are of other tiles, unless none is below a house."""
     request, _ = town_with_gates
-    beside = shapely.box(*(ORIGIN[:2] - 50), *(ORIGIN[:2] - 45))
-    layer = str(write_layer(tmp_path / "beside.geojson", [beside], {"height": [3.0]}))
-    with pytest.warns(InputWarning, match="expected underpasses below the footprints, got none"):
+    gates = [shapely.box(*(ORIGIN[:2] + c), *(ORIGIN[:2] + c + 5)) for c in np.array(corners)]
+    layer = str(write_layer(tmp_path / "some.geojson", gates, {"height": [3.0] * len(gates)}))
+    with pytest.warns(
+        InputWarning, match=f"expected underpasses below the footprints, got {found}"
+    ):
         make_plan(replace(request, underpasses=layer))
 
 

@@ -44,9 +44,13 @@ def add_passages(
     layer = read_passages(request, frame)
     tree = shapely.STRtree([polygon for polygon, _ in layer])
     below = [select_below(footprint, layer, tree) for footprint in footprints]
-    if layer and not any(below):
+    area = shapely.box(*shapely.total_bounds([footprint.polygon for footprint in footprints]))
+    used = len({id(passage) for passages in below for passage in passages})
+    near = len(tree.query(area, predicate="intersects"))
+    if layer and used < max(1, near):
+        found = f"{used} of {near} in" if used else "none of"
         warnings.warn(
-            f"expected underpasses below the footprints, got none of {request.underpasses} there; "
+            f"expected underpasses below the footprints, got {found} {request.underpasses} there; "
             "check its place and its CRS",
             InputWarning,
         )
