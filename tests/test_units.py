@@ -162,6 +162,13 @@ def test_solids_in_feet_are_read_back_in_metres(in_metres, tmp_path):
         assert figures.quality.share_within_20cm > 0.95 and figures.quality.outline_iou > 0.99
 
 
+def test_heights_taken_in_feet_for_want_of_a_name_are_remarked(tmp_path):
+    cloud, footprints = write_town_in(tmp_path / "feet", FEET, "EPSG:2263", "EPSG:2263")
+    request = Request((cloud,), tmp_path / "out", footprints)
+    with pytest.warns(InputWarning, match=r"heights are taken in US survey foot, .* names none"):
+        make_plan(request)
+
+
 def test_clouds_of_another_crs_than_the_run_are_not_measured_against(in_metres, tmp_path):
     cloud = write_cloud(tmp_path / "feet.laz", TOWN.xyz, TOWN.classification, "EPSG:2263")
     sentence = r"EPSG:7415 .* in the run and EPSG:2263 .* in .*feet\.laz"

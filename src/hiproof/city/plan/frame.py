@@ -16,6 +16,7 @@ from ...read.crs import (
     combine,
     describe_crs,
     find_units,
+    has_heights,
     names_heights_alone,
     names_place,
     parse_crs,
@@ -70,6 +71,12 @@ def settle_frame(request: Any, headers: list[PointFileHeader]) -> AreaFrame:
         else:
             text = f"taken to be in the footprints' {describe_crs(footprints)}"
         warn(headers[0].path, f"names no CRS; {text}; say otherwise with --crs or --unit")
+    if read.unit == "auto" and not (frame.units.are_metres or has_heights(frame.crs)):
+        warn(
+            headers[0].path,
+            f"heights are taken in {frame.units.height_name}, for {describe_crs(frame.crs)} names "
+            "none; if they are in metres, name both with --crs, such as EPSG:2263+5703",
+        )
     warn_coarse(headers, frame.units)
     if frame.crs is not None:
         warn_outside_area_of_use(headers, frame)
