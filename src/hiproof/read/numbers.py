@@ -52,12 +52,10 @@ class SkippedValues:
     def warn(self) -> None:
         """Warn once for each kind of values that were left out."""
         for expected, values in self.values.items():
-            subset = ", ".join(values[:MOST_SHOWN_VALUES]) + (
-                ", ..." if len(values) > MOST_SHOWN_VALUES else ""
-            )
+            shown = values[:MOST_SHOWN_VALUES] + ["..."] * (len(values) > MOST_SHOWN_VALUES)
             warn(
                 self.source,
-                f"expected {expected}, left out {len(values)} of its values: {subset}",
+                f"expected {expected}, left out {len(values)} of its values: {', '.join(shown)}",
             )
 
 

@@ -54,19 +54,18 @@ def parse_index(words: np.ndarray) -> tuple[RunIndex, int]:
             raise ValueError(f"expected {mark.decode()} in its word {place}")
     if words[3] or words[7] or words[8] or words[14]:
         raise ValueError("expected a whole quadtree with counts of 32 bits")
-    min_x, max_x, min_y, max_y = words[9:13].view("<f4")
+    lower, upper = words[9:13].view("<f4").reshape(2, 2).T
     boxes, intervals, indexed_points, position = [], [], 0, 16
     for _ in range(int(words[15])):
         index, count, points = words[position : position + 3].tolist()
         position += 3 + 2 * count
-        boxes.append(cell_box(index, np.array([min_x, min_y]), np.array([max_x, max_y])))
         intervals.append(words[position - 2 * count : position].reshape(count, 2))
+        boxes += [cell_box(index, lower, upper)] * count
         indexed_points += points
-    if not boxes:
+    if not intervals:
         raise ValueError("it has no cells")
-    cell_of = np.repeat(np.arange(len(boxes)), list(map(len, intervals)))
     runs = np.concatenate(intervals).astype(np.int64) + [0, 1]
-    return RunIndex(np.array(boxes), cell_of, runs), indexed_points
+    return RunIndex(np.reshape(boxes, (-1, 4)), runs), indexed_points
 
 
 def cell_box(index: int, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:

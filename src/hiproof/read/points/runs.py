@@ -21,18 +21,15 @@ RUN_POINTS = 50_000
 
 @dataclass(frozen=True)
 class RunIndex:
-    """Boxes of cells, and `runs` (r, 2), [first, end), of points of cells `cell_of` (r,)."""
+    """The `runs` (r, 2), [first, end), of points that lie in `boxes` (r, 4)."""
 
     boxes: np.ndarray
-    cell_of: np.ndarray
     runs: np.ndarray
 
     def find_runs(self, boxes: np.ndarray) -> np.ndarray:
         """Return ascending runs (k, 2) with all points, and others, inside `boxes` (m, 4)."""
-        cells = shapely.STRtree(shapely.box(*self.boxes.T))
-        met = np.zeros(len(self.boxes), bool)
-        met[cells.query(shapely.box(*boxes.T))[1]] = True
-        return join_runs(self.runs[met[self.cell_of]])
+        tree = shapely.STRtree(shapely.box(*self.boxes.T))
+        return join_runs(self.runs[np.unique(tree.query(shapely.box(*boxes.T))[1])])
 
 
 def join_runs(runs: np.ndarray) -> np.ndarray:
@@ -65,8 +62,4 @@ def make_index(boxes: np.ndarray, points: int) -> RunIndex | None:
     if not len(boxes) == math.ceil(points / RUN_POINTS) > 0:
         return None
     first = np.arange(len(boxes)) * RUN_POINTS
-    return RunIndex(
-        boxes,
-        np.arange(len(boxes)),
-        np.column_stack([first, np.minimum(first + RUN_POINTS, points)]),
-    )
+    return RunIndex(boxes, np.column_stack([first, np.minimum(first + RUN_POINTS, points)]))
