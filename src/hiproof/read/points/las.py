@@ -69,6 +69,20 @@ def check_nodes(xyz: np.ndarray, octree: Octree) -> None:
         )
 
 
+def read_box(file: BinaryIO, facts: LasFacts, box: Box) -> Iterator[Decoded]:
+    """Yield the points of the octree's nodes that meet `box`, all at once."""
+    if facts.octree is None:
+        raise Implausible(
+            "its first record says that it is COPC, and none tells of an octree; it is damaged"
+        )
+    octree = find_nodes(facts.octree, box)
+    decoded = xyz, _, _ = read_nodes(file, octree.nodes, facts)
+    check_points(xyz, facts)
+    if len(xyz):
+        check_nodes(xyz, octree)
+    yield decoded
+
+
 # What is decompressed of points of formats 6 to 10; older formats come whole.
 SELECTION = (
     DecompressionSelection.XY_RETURNS_CHANNEL
@@ -164,23 +178,25 @@ def las_chunks(
     of points, [first, end), limit what is read of another file. To `noted` go the boxes (k, 4) of
     the runs of each chunk (runs.py), of all its points.
     """
-    if box is not None and is_copc(path):
-        yield copc_chunk(path, box)
-        return
-    facts, left_out = read_checked_facts(path), 0
+    facts, left_out, count = read_checked_facts(path), 0, 0
     lower, upper = np.full(3, np.inf), np.full(3, -np.inf)
     parts = [(0, facts.count)] if runs is None else runs.tolist()
     with translate_errors(path), open_binary(path) as file:
-        for xyz, classes, is_withheld in read_points(file, facts, parts, chunk_points):
+        chunks = read_points(file, facts, parts, chunk_points)
+        if box is not None and is_copc(path):
+            chunks = read_box(file, facts, box)
+        for xyz, classes, is_withheld in chunks:
             lowest, highest = check_points(xyz, facts)
             lower, upper = np.minimum(lower, lowest), np.maximum(upper, highest)
             if noted is not None:
                 noted.append(compute_run_boxes(xyz))
             left_out += int(is_withheld.sum())
+            count += len(xyz)
             yield xyz[~is_withheld], classes[~is_withheld]
-        if runs is None and facts.count:
+        if runs is None and 0 < count == facts.count:
             check_all_points(lower, upper, facts)
-    log_withheld(left_out, path)
+    if left_out:
+        warn(path, f"{count_things(left_out, 'point')} flagged as withheld left out")
 
 
 def is_copc(path: FilePath) -> bool:
@@ -188,27 +204,3 @@ def is_copc(path: FilePath) -> bool:
     with translate_errors(path), open_binary(path) as file:
         head = file.read(400)
     return head[375 + 2 : 375 + 6] == b"copc"
-
-
-def copc_chunk(path: FilePath, box: Box) -> Chunk:
-    facts = read_checked_facts(path)
-    with translate_errors(path), open_binary(path) as file:
-        if facts.octree is None:
-            raise Implausible(
-                "its first record says that it is COPC, and none tells of an octree; it is damaged"
-            )
-        octree = find_nodes(facts.octree, box)
-        xyz, classes, is_withheld = read_nodes(file, octree.nodes, facts)
-        lower, upper = check_points(xyz, facts)
-        if len(xyz):
-            check_nodes(xyz, octree)
-        if 0 < len(xyz) == facts.count:
-            check_all_points(lower, upper, facts)
-    log_withheld(int(is_withheld.sum()), path)
-    return xyz[~is_withheld], classes[~is_withheld]
-
-
-def log_withheld(count: int, path: FilePath) -> None:
-    """Log once, not by the chunk, how many points of a file were withheld."""
-    if count:
-        warn(path, f"{count_things(count, 'point')} flagged as withheld left out")
