@@ -69,11 +69,11 @@ def test_however_many_houses_grow_the_shift_is_that_of_the_ground(seed, share, s
 @pytest.mark.parametrize(("count", "share"), [(10, 0.0), (10, 0.6), (20, 0.6)])
 def test_half_a_metre_aside_is_found_where_most_houses_grew(count, share):
     errors = []
-    for seed in range(8):
+    for seed in range(6):
         shift = np.array([*np.random.default_rng(seed).choice([-0.5, 0.5], 2), 0.05])
         found = register_surveys(draw_samples(seed, draw_rises(seed, count, share), shift), READ)
         errors.append(np.abs(found.clear_xyz - shift).max())
-    assert sum(error < 0.15 for error in errors) >= 7, np.sort(errors)[-3:]
+    assert sum(error < 0.15 for error in errors) >= 5, np.sort(errors)[-3:]
 
 
 @pytest.mark.parametrize(("count", "share"), [(3, 0.0), (4, 0.25), (6, 0.6)])
