@@ -4,6 +4,7 @@ that go wrong.
 
 import os
 import signal
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -45,52 +46,51 @@ def solve_quickly(folder, tile, terrain=None, avoid=()):
     return solve_with(count_points, folder, tile, terrain, avoid)
 
 
-def solve_killed_once(folder, tile, terrain=None, avoid=()):
-    """The worker that first comes to the deadly building is killed, as if from outside."""
+def solve_spoilt(spoil, folder, tile, terrain, avoid):
+    """Count the points of all buildings, and do to the process what comes with the deadly one."""
 
-    def reconstruct(
-        points, footprint, terrain, settings, id, ground=None, unused=None, neighbours=()
-    ):
-        mark = Path(folder) / "killed"
-        if id == DEADLY and not mark.exists():
-            mark.touch()
-            os.kill(os.getpid(), signal.SIGKILL)
+    def reconstruct(points, footprint, terrain, settings, id, *rest, **named):
+        if id == DEADLY:
+            spoil()
         return count_points(points, footprint, terrain, settings, id)
 
     return solve_with(reconstruct, folder, tile, terrain, avoid)
+
+
+def die():
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def die_once(folder):
+    """Die as if killed from outside, once a run."""
+    mark = Path(folder) / "killed"
+    if not mark.exists():
+        mark.touch()
+        die()
+
+
+def eat_memory():
+    """Want more memory than the worker may have."""
+    import resource  # Windows has none
+
+    limits = resource.getrlimit(resource.RLIMIT_AS)
+    resource.setrlimit(resource.RLIMIT_AS, (4 << 30, limits[1]))
+    try:
+        np.ones(1 << 30)
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, limits)
+
+
+def solve_killed_once(folder, tile, terrain=None, avoid=()):
+    return solve_spoilt(partial(die_once, folder), folder, tile, terrain, avoid)
 
 
 def solve_deadly(folder, tile, terrain=None, avoid=()):
-    """One building kills every worker that tries it."""
-
-    def reconstruct(
-        points, footprint, terrain, settings, id, ground=None, unused=None, neighbours=()
-    ):
-        if id == DEADLY:
-            os.kill(os.getpid(), signal.SIGKILL)
-        return count_points(points, footprint, terrain, settings, id)
-
-    return solve_with(reconstruct, folder, tile, terrain, avoid)
+    return solve_spoilt(die, folder, tile, terrain, avoid)
 
 
 def solve_hungry(folder, tile, terrain=None, avoid=()):
-    """One building wants more memory than the worker may have."""
-
-    def reconstruct(
-        points, footprint, terrain, settings, id, ground=None, unused=None, neighbours=()
-    ):
-        if id == DEADLY:
-            import resource  # Windows has none
-
-            limits = resource.getrlimit(resource.RLIMIT_AS)
-            resource.setrlimit(resource.RLIMIT_AS, (4 << 30, limits[1]))
-            try:
-                np.ones(1 << 30)
-            finally:
-                resource.setrlimit(resource.RLIMIT_AS, limits)
-        return count_points(points, footprint, terrain, settings, id)
-
-    return solve_with(reconstruct, folder, tile, terrain, avoid)
+    return solve_spoilt(eat_memory, folder, tile, terrain, avoid)
 
 
 def read_jobs_from(path):
@@ -110,8 +110,5 @@ def solve_without_compiling(folder, tile, terrain=None, avoid=()):
 
 def kill_once_and_update(folder, tile, terrain=None, avoid=()):
     """The worker that comes first is killed, as if from outside."""
-    mark = Path(folder) / "killed"
-    if not mark.exists():
-        mark.touch()
-        os.kill(os.getpid(), signal.SIGKILL)
+    die_once(folder)
     return update_tile(folder, tile, terrain, avoid)

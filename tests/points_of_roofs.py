@@ -46,6 +46,14 @@ def scatter(outline, rng, density=8.0):
     return xy[shapely.contains_xy(outline, *xy.T)]
 
 
+def scan_roof(rng, roof, density=8.0, noise=0.03):
+    """Points (n, 3) over a roof, with the noise of a scanner."""
+    x0, y0, x1, y1 = roof.outline.bounds
+    xy = rng.uniform((x0, y0), (x1, y1), (rng.poisson(density * (x1 - x0) * (y1 - y0)), 2))
+    z = roof.height_at(xy)
+    return np.column_stack([xy, z + rng.normal(0, noise, len(xy))])[np.isfinite(z)]
+
+
 def sample_heights(height, outline, density=8.0, noise=0.03, seed=0):
     """Points (n, 3) at random over `outline` on the surface `height(x, y)`."""
     rng = np.random.default_rng(seed)

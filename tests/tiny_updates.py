@@ -1,6 +1,8 @@
 """Updates of runs over the tiny town."""
 
 import dataclasses
+import json
+import shutil
 
 import numpy as np
 import shapely
@@ -10,7 +12,7 @@ from hiproof.city.run import reconstruct_area
 from hiproof.update.request import UpdateRequest
 from hiproof.update.run import update_area
 from run_records import by_id
-from tiny_town import ORIGIN, make_town, write_footprints
+from tiny_town import ORIGIN, write_footprints
 
 DATE = "2024-05-01"
 
@@ -23,9 +25,13 @@ def run_over(folder, town, shift=0.0):
     return folder / "models"
 
 
-def make_run(folder):
-    """Return the folder of a run over the tiny town."""
-    return run_over(folder, make_town(density=8.0))
+def lose_clouds(run, folder):
+    """Return a copy of a run whose clouds are gone."""
+    run = shutil.copytree(run, folder / "run")
+    record = json.loads((run / "run.json").read_text())
+    record["inputs"]["clouds"] = ["gone.laz"]
+    (run / "run.json").write_text(json.dumps(record))
+    return run
 
 
 def make_request(run, cloud, out, **options):

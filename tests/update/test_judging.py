@@ -19,19 +19,11 @@ from hiproof.update.ground import Ground
 from hiproof.update.judge import judge_building
 from hiproof.update.kinds import name_differences
 from hiproof.update.register import SampledRoof, SurveyShift, register_surveys
+from points_of_roofs import scan_roof as scan
 
 SHIFT, GROUND = SurveyShift(sigma=(0.4, 0.4, 0.01)), Ground(np.zeros(3), 0.0, 0.0)
 FLAT = {"length": 16.0, "width": 10.0}
 GABLE = {"length": 14.0, "width": 9.0, "height": 3.5}
-
-
-def scan(rng, roof, density=8.0):
-    """Points over a roof, with the noise of a scanner."""
-    x0, y0, x1, y1 = roof.outline.bounds
-    xy = rng.uniform((x0, y0), (x1, y1), (rng.poisson(density * (x1 - x0) * (y1 - y0)), 2))
-    z = roof.height_at(xy)
-    known = np.isfinite(z)
-    return np.column_stack([xy, z + rng.normal(0, 0.03, len(xy))])[known]
 
 
 def make_roof(kind="gable", parameters=None, eave=6.0, place=(0.0, 0.0)):

@@ -1,7 +1,6 @@
 """Unchanged buildings estimated by both surveys, and false alarms controlled over a city."""
 
 import json
-import shutil
 
 import numpy as np
 import pytest
@@ -13,7 +12,7 @@ from hiproof.update.refine import combine_sigmas
 from hiproof.update.run import update_area
 from run_records import by_id, records
 from tiny_town import make_town
-from tiny_updates import DATE, make_request, raise_house
+from tiny_updates import DATE, lose_clouds, make_request, raise_house
 
 
 @pytest.fixture(scope="module")
@@ -66,10 +65,7 @@ def test_more_points_lessen_the_share_of_their_scatter_alone():
 
 
 def test_refining_without_the_earlier_points_is_refused(town_run, cloud, tmp_path):
-    run = shutil.copytree(town_run, tmp_path / "run")
-    record = json.loads((run / "run.json").read_text())
-    record["inputs"]["clouds"] = ["gone.laz"]
-    (run / "run.json").write_text(json.dumps(record))
+    run = lose_clouds(town_run, tmp_path)
     with (
         pytest.warns(UserWarning, match="models alone"),
         pytest.raises(InputError, match="leave out --refine"),

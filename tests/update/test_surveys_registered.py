@@ -14,18 +14,11 @@ from hiproof.settings import ReadSettings
 from hiproof.simulate import random_building
 from hiproof.simulate.roofs import make_part
 from hiproof.update.register import SampledRoof, SurveyShift, read_shift, register_surveys
+from points_of_roofs import scan_roof as scan
 
 READ = ReadSettings()
 SIDE_M = 190.0
 SHED = {"width": 8.0, "length": 12.0, "height": 5.0}
-
-
-def scan(rng, roof, density=8.0):
-    """Points over a roof, with the noise of a scanner."""
-    x0, y0, x1, y1 = roof.outline.bounds
-    xy = rng.uniform((x0, y0), (x1, y1), (rng.poisson(density * (x1 - x0) * (y1 - y0)), 2))
-    z = roof.height_at(xy)
-    return np.column_stack([xy, z + rng.normal(0, 0.03, len(xy))])[np.isfinite(z)]
 
 
 def draw_samples(seed, rises, shift=(0.0, 0.0, 0.0), has_ground=True, tilt=0.0, slopes=None):

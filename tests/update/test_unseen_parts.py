@@ -1,8 +1,6 @@
 """Parts of roofs that a new survey does not show: an update never calls these unchanged."""
 
 import dataclasses
-import json
-import shutil
 
 import numpy as np
 import pytest
@@ -12,9 +10,10 @@ from hiproof.simulate import random_building
 from hiproof.update.cells import SurveyNoise, compare_points
 from hiproof.update.judge import is_not_covered
 from hiproof.update.unseen import draw_unseen
+from points_of_roofs import scan_roof as scan
 from run_records import by_id
 from tiny_town import ORIGIN, make_town
-from tiny_updates import run_over, take_class, update
+from tiny_updates import lose_clouds, run_over, take_class, update
 
 WING = (6.0, 5.0)  # m: its length and width, east of every house but the last
 
@@ -71,9 +70,7 @@ def test_a_wing_without_points_of_the_roof_is_not_called_unchanged(
 
 
 def test_without_the_earlier_clouds_the_model_says_what_could_be_seen(run, tmp_path):
-    models = shutil.copytree(run, tmp_path / "models")
-    record = json.loads((models / "run.json").read_text().replace("first.laz", "moved.laz"))
-    (models / "run.json").write_text(json.dumps(record))
+    models = lose_clouds(run, tmp_path)
     town, wings = make_winged(6.0, 6)
     town = hide(town, town.lie_in(wings["house-2"]))
     with pytest.warns(UserWarning, match="compared with its models alone"):
@@ -131,13 +128,6 @@ def test_a_changed_house_also_names_its_unseen_wing(run, tmp_path):
     assert change["class"] == "changed"
     kinds = [place["kind"] for place in change["places"]]
     assert kinds[-1] == "unseen" and "raised" in kinds[0]
-
-
-def scan(rng, roof, density):
-    x0, y0, x1, y1 = roof.outline.bounds
-    xy = rng.uniform((x0, y0), (x1, y1), (rng.poisson(density * (x1 - x0) * (y1 - y0)), 2))
-    points = np.column_stack([xy, roof.height_at(xy) + rng.normal(0, 0.03, len(xy))])
-    return points[np.isfinite(points[:, 2])]
 
 
 def find(roof, old, new):

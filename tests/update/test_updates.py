@@ -26,7 +26,7 @@ from hiproof.update.run import update_area
 from hiproof.write.fragments import load_fragments, save_fragments
 from run_records import RECORDS, by_id, records
 from tiny_town import ORIGIN, make_town, write_footprints
-from tiny_updates import DATE, lay_bare, make_request, raise_house, run_over
+from tiny_updates import DATE, lay_bare, lose_clouds, make_request, raise_house, run_over
 
 RAISED_M = 2.0
 
@@ -330,10 +330,7 @@ def test_a_town_that_rose_and_a_survey_without_ground_are_not_taken_for_a_shift_
 
 
 def test_without_its_clouds_a_run_is_compared_by_its_models(run, cloud, tmp_path):
-    run = shutil.copytree(run, tmp_path / "run")
-    record = json.loads((run / "run.json").read_text())
-    record["inputs"]["clouds"] = ["gone.laz"]
-    (run / "run.json").write_text(json.dumps(record))
+    run = lose_clouds(run, tmp_path)
     with pytest.warns(UserWarning, match="compared with its models alone"):
         summary = update_area(make_request(run, cloud, tmp_path / "out"))
     assert summary.by_change == {"unchanged": 2, "changed": 1, "gone": 1}
