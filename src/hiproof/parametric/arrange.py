@@ -83,20 +83,19 @@ def merged_parts(item: dict[str, Any], other: dict[str, Any]) -> dict[str, Any]:
         key=lambda part: sum(make_polygon(outline).area for outline in part["outlines"]),
         reverse=True,
     )
-    along, across = find_axis(main, "length"), find_axis(main, "width")
-    corners = np.concatenate([compute_corners(main), compute_corners(side)])
-    lower, upper = (np.array([f(corners @ along), f(corners @ across)]) for f in (np.min, np.max))
-    x, y = 0.5 * (lower + upper) @ np.array([along, across])
-    parameters = resize_rectangle(main["parameters"], "length", float(upper[0] - lower[0]))
-    parameters = resize_rectangle(parameters, "width", float(upper[1] - lower[1]))
-    moved = np.array([x, y]) - main["position"][:2]
-    parameters = keep_cants_in_place(parameters, float(moved @ along), float(moved @ across))
+    axes = np.array([find_axis(main, "length"), find_axis(main, "width")])
+    corners = np.concatenate([compute_corners(main), compute_corners(side)]) @ axes.T
+    lower, upper = corners.min(axis=0), corners.max(axis=0)
+    parameters = main["parameters"]
+    for name, size in zip(("length", "width"), (upper - lower).tolist(), strict=True):
+        parameters = resize_rectangle(parameters, name, size)
+    middle = 0.5 * (lower + upper) @ axes
+    moved = (middle - main["position"][:2]) @ axes.T
     together = unite([make_polygon(o) for part in (main, side) for o in part["outlines"]], GRID_M)
-    position = [float(x), float(y), main["position"][2]]
     return {
         **leave_out(main, "sigma"),
-        "parameters": parameters,
-        "position": position,
+        "parameters": keep_cants_in_place(parameters, *moved.tolist()),
+        "position": [*middle.tolist(), main["position"][2]],
         "outlines": list_rings(together),
     }
 

@@ -45,19 +45,14 @@ class Reprojected(Units):
     def from_metres(self, world: np.ndarray) -> np.ndarray:
         """Return file coordinates of world metres (..., 2 or 3); InputError without any there."""
         world = np.asarray(world, float)
-        coordinates = self.own.from_metres(world)
-        result = np.stack(
-            self.plan_way.transform(coordinates[..., 0], coordinates[..., 1]), axis=-1
-        )
-        if world.shape[-1] == 3:
+        places = np.moveaxis(self.own.from_metres(world), -1, 0)
+        columns = [*self.plan_way.transform(*places[:2])]
+        if len(places) == 3:
             z = world[..., 2]
             if self.height_way is not None:
-                z = self.height_m * np.asarray(
-                    self.height_way.transform(
-                        coordinates[..., 0], coordinates[..., 1], coordinates[..., 2]
-                    )[2]
-                )
-            result = np.concatenate([result, (z / self.height)[..., None]], axis=-1)
+                z = self.height_m * np.asarray(self.height_way.transform(*places)[2])
+            columns.append(z / self.height)
+        result = np.stack(columns, axis=-1)
         if not np.isfinite(result).all() and np.isfinite(world).all():
             raise InputError(
                 "expected buildings inside the area of --out-crs, got some that have no place in "
@@ -67,20 +62,16 @@ class Reprojected(Units):
 
     def to_metres(self, coordinates: ArrayLike) -> np.ndarray:
         """Return world metres of the file's coordinates (..., 2) or (..., 3)."""
-        coordinates = np.asarray(coordinates, float)
-        x, y = coordinates[..., 0], coordinates[..., 1]
-        result = self.own.to_metres(
-            np.stack(self.plan_way.transform(x, y, direction="INVERSE"), axis=-1)
-        )
-        if coordinates.shape[-1] == 2:
-            return result
-        z = coordinates[..., 2] * self.height
-        if self.height_way is not None:
-            z = (
-                self.height_way.transform(x, y, z / self.height_m, direction="INVERSE")[2]
-                * self.own.height
-            )
-        return np.concatenate([result, z[..., None]], axis=-1)
+        x, y, *heights = np.moveaxis(np.asarray(coordinates, float), -1, 0)
+        plan = np.stack(self.plan_way.transform(x, y, direction="INVERSE"), axis=-1)
+        columns = [self.own.to_metres(plan)]
+        for height in heights:
+            z = height * self.height
+            if self.height_way is not None:
+                z = self.height_way.transform(x, y, z / self.height_m, direction="INVERSE")[2]
+                z = z * self.own.height
+            columns.append(z[..., None])
+        return np.concatenate(columns, axis=-1)
 
 
 def choose_file_crs(crs: Any, requested: str) -> Any:

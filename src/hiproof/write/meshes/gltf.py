@@ -19,7 +19,7 @@ import numpy as np
 from ...model import Face
 from ..colours import linear_rgb
 from .triangles import face_normals, faces_triangles
-from .viewed import Look, ViewedModel, merge_values
+from .viewed import Look, ViewedModel
 
 VERTICES, INDICES = 34962, 34963  # ARRAY_BUFFER and ELEMENT_ARRAY_BUFFER of WebGL, which glTF names
 COMPONENT_TYPES = {"f4": 5126, "u4": 5125, "u2": 5123, "u1": 5121}
@@ -92,8 +92,7 @@ def write_models(path: Path, buildings: Iterable[ViewedModel], crs: str | None =
     materials: dict[Look, int] = {}
     for model in buildings:
         origin = origin if nodes else model.corner
-        extras = merge_values({"id": model.id, "roof_type": model.roof_type}, model.attributes)
-        nodes.append({"name": model.id, "mesh": len(meshes), "extras": extras})
+        nodes.append({"name": model.id, "mesh": len(meshes), "extras": model.values})
         primitives = add_primitives(document, model, origin, materials)
         meshes.append({"name": model.id, "primitives": primitives})
     document.tables["asset"]["extras"] = {

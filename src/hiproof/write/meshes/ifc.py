@@ -21,7 +21,7 @@ from ...frames import Units
 from ...model import CEILING, GROUND, ROOF, WALL, Face
 from ..colours import list_legend, srgb
 from ..naming import PlacedNames, crs_name, make_uuid
-from .viewed import Look, ViewedModel, choose_look, merge_values
+from .viewed import Look, ViewedModel, choose_look
 
 IFC_SCHEMA = "IFC4X3"
 PROPERTY_SET = "hiproof"
@@ -197,11 +197,9 @@ class IfcModel:
 
     def add_properties(self, building: Any, key: str, model: ViewedModel) -> None:
         """Add the attributes of a building, those that are known."""
-        members = {"id": model.id, "roof_type": model.roof_type}
-        values = merge_values(members, model.attributes)
         properties = [
             self.make("IfcPropertySingleValue", Name=name, NominalValue=self.make_value(value))
-            for name, value in values.items()
+            for name, value in model.values.items()
             if value is not None
         ]
         related = self.make_rooted(

@@ -22,7 +22,7 @@ from ...extras import import_extra
 from ...model import CEILING, GROUND, ROOF, WALL, Face
 from ..naming import PlacedNames, make_uuid
 from .triangles import faces_triangles
-from .viewed import ViewedModel, choose_look, merge_values
+from .viewed import ViewedModel, choose_look
 
 RHINO_VERSION = 7  # of the file, which Rhino 7 and later open
 
@@ -76,7 +76,6 @@ def add_building(
     group = rhino.Group()
     group.Name, group.Id = model.id, make_uuid("group", key)
     document.Groups.Add(group)
-    values = merge_values({"id": model.id, "roof_type": model.roof_type}, model.attributes)
     for (kind, part), faces in model.faces_by_element().items():
         attributes = rhino.ObjectAttributes()
         attributes.Id = make_uuid(kind, f"{key} {part}")
@@ -85,7 +84,7 @@ def add_building(
         colour = choose_look(faces[0], model.part_types).colour
         attributes.ObjectColor = (*bytes.fromhex(colour[1:]), 255)
         attributes.ColorSource = rhino.ObjectColorSource.ColorFromObject
-        for name, value in values.items():
+        for name, value in model.values.items():
             if value is not None:
                 text = value if isinstance(value, str) else json.dumps(value)
                 attributes.SetUserString(name, text)

@@ -39,6 +39,11 @@ class ViewedModel(NamedTuple):
         """The solid's lowest coordinates (3,) in whole metres, an origin of files."""
         return np.floor(self.solid.vertices.min(axis=0))
 
+    @property
+    def values(self) -> dict[str, Any]:
+        """Its id, its roof type and its attributes, by name."""
+        return merge_values({"id": self.id, "roof_type": self.roof_type}, self.attributes)
+
     def faces_by_look(self) -> dict[Look, list[Face]]:
         """Group roofs, walls, grounds and ceilings by their look."""
         return self.group_faces(lambda face: choose_look(face, self.part_types))

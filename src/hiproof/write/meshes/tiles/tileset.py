@@ -237,35 +237,26 @@ def quadtree(
     >>> tree.items.tolist(), [(child.name, child.items.tolist()) for child in tree.children]
     ([0], [('r0', [1]), ('r3', [2])])
     """
+
+    def grow(name: str, items: np.ndarray, lower: np.ndarray, side: float) -> Tile:
+        """Return the tile of `items` in the square from `lower` (2,) over `side` metres."""
+        largest = items[np.argsort(-sizes[items], kind="stable")]
+        fits = np.cumsum(triangles[largest]) <= limit
+        fits[0] = True
+        selection = largest[fits] if side <= widest else largest[:0]
+        remainder, half = np.setdiff1d(items, selection), side / 2
+        quarter = (centres[remainder] >= lower + half) @ [1, 2]
+        children = [
+            grow(
+                f"{name}{q}",
+                remainder[quarter == q],
+                lower + half * np.array([q % 2, q // 2]),
+                half,
+            )
+            for q in range(4)
+            if (quarter == q).any()
+        ]
+        return Tile(name, np.sort(selection), tuple(children))
+
     smallest, largest = centres.min(axis=0), centres.max(axis=0)
-    return grow_tile(
-        "r",
-        np.arange(len(centres)),
-        smallest,
-        float((largest - smallest).max()),
-        (centres, sizes, triangles, limit, widest),
-    )
-
-
-def grow_tile(name: str, items: np.ndarray, lower: np.ndarray, side: float, tables: tuple) -> Tile:
-    """Return the tile of `items` in the square from `lower` (2,) over `side` metres."""
-    centres, sizes, triangles, limit, widest = tables
-    largest = items[np.argsort(-sizes[items], kind="stable")]
-    fits = np.cumsum(triangles[largest]) <= limit
-    fits[0] = True
-    selection = largest[fits] if side <= widest else largest[:0]
-    remainder = np.setdiff1d(items, selection)
-    middle = lower + side / 2
-    quarter = (centres[remainder] >= middle) @ [1, 2]
-    children = [
-        grow_tile(
-            f"{name}{q}",
-            remainder[quarter == q],
-            lower + side / 2 * np.array([q % 2, q // 2]),
-            side / 2,
-            tables,
-        )
-        for q in range(4)
-        if (quarter == q).any()
-    ]
-    return Tile(name, np.sort(selection), tuple(children))
+    return grow("r", np.arange(len(centres)), smallest, float((largest - smallest).max()))
