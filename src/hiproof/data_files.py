@@ -5,8 +5,10 @@ from collections.abc import Iterable, Mapping
 from importlib import resources
 from typing import Any
 
+Values = dict[str, Any]  # values by name: a table of TOML, an object of JSON, a row of a table
 
-def read_data_file(name: str) -> dict[str, Any]:
+
+def read_data_file(name: str) -> Values:
     """Read data/NAME.toml."""
     return tomllib.loads(read_asset(f"data/{name}.toml"))
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import click
 
+from ..data_files import Values
 from ..errors import escape_unseen
 from ..log import count_things
 from ..progress import Update, show_progress
@@ -26,7 +27,7 @@ class CheckedFile:
     solids: int = 0
     findings: list[tuple[str, tuple[Any, ...]]] = field(default_factory=list)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Values:
         """Return the counts for `--json`, with every finding."""
         by_code = Counter(
             code for _, findings in self.findings for code in {finding.code for finding in findings}

@@ -18,10 +18,10 @@ from typing import Any, get_args, get_origin
 
 import click
 
-from ..data_files import read_data_file
+from ..data_files import Values, read_data_file
 from ..settings import Changes, Settings, toml_value
 
-COMMANDS: dict[str, dict[str, Any]] = read_data_file("commands")
+COMMANDS: dict[str, Values] = read_data_file("commands")
 SHARED_PARAMETERS = COMMANDS.pop("shared")
 MAIN_HEADING, FURTHER_HEADING = "Options", "Further options"
 
@@ -175,7 +175,7 @@ def make_setting_option(section: str, field: dataclasses.Field) -> click.Paramet
     )
 
 
-def collect_changes(params: Iterable[click.Parameter], values: dict[str, Any]) -> Changes:
+def collect_changes(params: Iterable[click.Parameter], values: Values) -> Changes:
     """Take the settings that options give from `values`, by section and name."""
     changes: Changes = {}
     for param in params:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 import sqlite3
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
+from ..data_files import Values
 from ..errors import InputError, escape_unseen
 from .running import describe_overview
 
@@ -43,7 +44,7 @@ def status(folder: Path, *, as_json: bool = False) -> None:
         click.echo(line)
 
 
-def read_state(ledger: Ledger) -> dict[str, Any]:
+def read_state(ledger: Ledger) -> Values:
     """Return the progress of a run for `--json`: tasks, buildings, rate, summary, failures."""
     tasks = ledger.tasks()
     sort, solve = ([task for task in tasks if task.kind == kind] for kind in ("sort", "solve"))
@@ -72,7 +73,7 @@ def measure_rate(closed: list[Task]) -> float | None:
     return sum(buildings for _, buildings in by_time[1:]) / seconds if seconds > 0 else None
 
 
-def describe(ledger: Ledger, state: dict[str, Any], folder: str) -> list[str]:
+def describe(ledger: Ledger, state: Values, folder: str) -> list[str]:
     """Return progress, summary and failures, a line each."""
     lines = [
         "point files read: {read} of {total}".format(**state["point_files"]),

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import shapely
 
+from ..data_files import Values
 from ..errors import InputError
 from ..geometry.rings import intersect, join, repair_polygons, subtract, unite
 from ..model import Roof
@@ -35,9 +36,7 @@ LEVEL_SLOPE = 0.05  # a slope that a dormer cannot run into; a block stands ther
 BLOCK_SIDE_M, BLOCK_HEIGHT_M = 3.0, 2.5  # m; a lift's or a staircase's head
 
 
-def split_part(
-    part: dict[str, Any], side: str = "length", share: float = 0.5
-) -> list[dict[str, Any]]:
+def split_part(part: Values, side: str = "length", share: float = 0.5) -> list[Values]:
     """Cut a part in two across its `side` at a share of it.
 
     `side` is "length" or "width". Both halves keep type, eave and height, and roof what lies on
@@ -76,7 +75,7 @@ def split_part(
     return halves
 
 
-def merged_parts(item: dict[str, Any], other: dict[str, Any]) -> dict[str, Any]:
+def merged_parts(item: Values, other: Values) -> Values:
     """Merge two parts as the larger one is, over the rectangle and the outlines of both."""
     main, side = sorted(
         map(with_sizes, (item, other)),
@@ -100,7 +99,7 @@ def merged_parts(item: dict[str, Any], other: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def add_dormer(roof: Roof, index: int, place: tuple[float, float] | None = None) -> dict[str, Any]:
+def add_dormer(roof: Roof, index: int, place: tuple[float, float] | None = None) -> Values:
     """Return a gable dormer on part `index`, its ridge running into the slope.
 
     Its middle is at `place` (x, y about the roof's origin) or half-way up a slope. Where the part
@@ -138,7 +137,7 @@ def place_on_slope(part: Any) -> tuple[float, float]:
     return float(x), float(y)
 
 
-def find_axis(part: dict[str, Any], side: str) -> np.ndarray:
+def find_axis(part: Values, side: str) -> np.ndarray:
     """Return the direction (2,) of a side of the part's rectangle."""
     turn = math.radians(part.get("rotation", 0.0)) + (0.0 if side == "length" else 0.5 * math.pi)
     return np.array([math.cos(turn), math.sin(turn)])
@@ -154,7 +153,7 @@ def resize_rectangle(parameters: dict[str, float], side: str, size: float) -> di
     return {**parameters, **grown, side: size}
 
 
-def compute_corners(part: dict[str, Any]) -> np.ndarray:
+def compute_corners(part: Values) -> np.ndarray:
     """Return the corners (4, 2) of the part's rectangle."""
     u = 0.5 * part["parameters"]["length"] * find_axis(part, "length")
     v = 0.5 * part["parameters"]["width"] * find_axis(part, "width")
@@ -213,7 +212,7 @@ def with_recess(
     return [*(leaving_out(part, cover_rectangle(recess)) for part in parts), recess]
 
 
-def replace_part(parts: list[Any], index: int, changed: dict[str, Any]) -> list[Any]:
+def replace_part(parts: list[Any], index: int, changed: Values) -> list[Any]:
     """Return the parts with `changed` as part `index`; they leave out its place, if the old."""
     old = roofed_by(parts[index])
     rectangle = cover_rectangle(changed) if "outlines" not in changed else roofed_by(changed)
@@ -223,9 +222,7 @@ def replace_part(parts: list[Any], index: int, changed: dict[str, Any]) -> list[
     return [*neighbours[:index], changed, *neighbours[index + 1 :]]
 
 
-def moved_along(
-    part: dict[str, Any], old: shapely.Geometry, new: shapely.Geometry
-) -> dict[str, Any]:
+def moved_along(part: Values, old: shapely.Geometry, new: shapely.Geometry) -> Values:
     """Return the part, leaving out `new` if it left out `old`."""
     if "outlines" not in part or old.equals(new):
         return part
@@ -236,7 +233,7 @@ def moved_along(
     return leaving_out({**part, "outlines": list_rings(whole)}, new)
 
 
-def leaving_out(part: dict[str, Any], area: shapely.Geometry) -> dict[str, Any]:
+def leaving_out(part: Values, area: shapely.Geometry) -> Values:
     """Return the part without `area`; raises InputError where nothing is left of it."""
     if not roofed_by(part).intersection(area).area > 0.0:
         return part
@@ -249,7 +246,7 @@ def leaving_out(part: dict[str, Any], area: shapely.Geometry) -> dict[str, Any]:
     return {**part, "outlines": rings}
 
 
-def roofed_by(part: dict[str, Any]) -> shapely.Geometry:
+def roofed_by(part: Values) -> shapely.Geometry:
     """Return what a part roofs in plan: its outlines, else its rectangle."""
     if part.get("outlines") is None:
         return cover_rectangle(part)
@@ -259,7 +256,7 @@ def roofed_by(part: dict[str, Any]) -> shapely.Geometry:
     return unite(outlines, GRID_M)
 
 
-def cover_rectangle(part: dict[str, Any]) -> shapely.Polygon:
+def cover_rectangle(part: Values) -> shapely.Polygon:
     """Return the rectangle of a part in plan; raises InputError for what are no numbers."""
     numbers_by_name(part.get("parameters") or {}, "the parameters")
     place(part.get("position"), "position")

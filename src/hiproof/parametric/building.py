@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
 from typing import Any
 
 from ..compose.settle import DIGITS, PLAN_DIGITS, round_number
+from ..data_files import Values
 from ..errors import InputError
 from ..geometry.outline_edges import list_outline_edges
 from ..model import (
@@ -27,7 +27,7 @@ from ..settings import ComposeSettings, Settings
 from .record import make_building, on_grid, read_object, read_position, require_mapping
 
 
-def make_underside(values: Mapping[str, Any], building: Building, roof: Roof) -> Underside:
+def make_underside(values: Values, building: Building, roof: Roof) -> Underside:
     """Make a solid's lower end in the frame of its `roof`; InputError for what makes none."""
     origin = roof.frame.origin
     lines = building.terrain_intersection if values.get("walls") == "terrain" else ()
@@ -43,7 +43,7 @@ def read_passage(record: Any, label: str, z_origin: float) -> Passage:
     return make_passage(read_object(record, "passage", label), z_origin)
 
 
-def make_passage(values: Mapping[str, Any], z_origin: float) -> Passage:
+def make_passage(values: Values, z_origin: float) -> Passage:
     ceiling = round_number(values["ceiling"], PLAN_DIGITS)
     return Passage(on_grid(values["outline"]), ceiling - z_origin)
 
@@ -51,7 +51,7 @@ def make_passage(values: Mapping[str, Any], z_origin: float) -> Passage:
 MOST_OVERHANG_M = 10.0  # longer ones are typing errors
 
 
-def make_eaves(values: Mapping[str, Any], roof: Roof) -> Eaves | None:
+def make_eaves(values: Values, roof: Roof) -> Eaves | None:
     """Make the overhangs, None without a list; raises InputError for one that cannot be."""
     if values.get("overhangs") is None:
         return None
@@ -80,7 +80,7 @@ def check_overhang(value_m: float, name: str, label: str = "") -> float:
     return round_number(value_m, DIGITS)
 
 
-def make_installation(values: Mapping[str, Any], label: str) -> Installation:
+def make_installation(values: Values, label: str) -> Installation:
     sizes = [values["parameters"].get(name, 0.0) for name in BOX_SIZES]
     if len(values["parameters"]) != len(BOX_SIZES) or min(sizes) <= 0:
         raise InputError(
@@ -95,7 +95,7 @@ def make_installation(values: Mapping[str, Any], label: str) -> Installation:
 BOX_SIZES = ("length", "width", "height")
 
 
-def build(parameters: Mapping[str, Any], compose: ComposeSettings | None = None) -> Building:
+def build(parameters: Values, compose: ComposeSettings | None = None) -> Building:
     """Build the building of `parameters`, an object of a parameters.jsonl.
 
     `read_parameters` reads such objects. A run's own parameters give the run's own building.

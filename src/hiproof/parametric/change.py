@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import shapely
 
+from ..data_files import Values
 from ..errors import InputError
 from ..geometry.rings import repair_polygons
 from ..primitives.catalogue import CATALOGUE
@@ -26,7 +27,7 @@ USUAL_PITCH = 0.5  # rise by run of a roof made of a flat one
 STEEPEST_SLOPE = math.tan(math.radians(85.0))  # rise over run; a steeper plane is a wall
 
 
-def changed_part(part: dict[str, Any], change: dict[str, Any], z_origin: float) -> dict[str, Any]:
+def changed_part(part: Values, change: Values, z_origin: float) -> Values:
     """Return a part after a change.
 
     A change may name `type`, `position` (x, y, z about the origin), `rotation` (degrees),
@@ -47,7 +48,7 @@ def changed_part(part: dict[str, Any], change: dict[str, Any], z_origin: float) 
         measure(change.pop(name), name) if name in change else None
         for name in ("ridge_height", "eave_height")
     )
-    placed: dict[str, Any] = {
+    placed: Values = {
         name: change.pop(name) for name in ("position", "rotation", "outlines") if name in change
     }
     if SIDED & change.keys():
@@ -61,11 +62,11 @@ def changed_part(part: dict[str, Any], change: dict[str, Any], z_origin: float) 
     return part if ridge is None else with_ridge(part, ridge - z_origin)
 
 
-def leave_out(part: dict[str, Any], name: str) -> dict[str, Any]:
+def leave_out(part: Values, name: str) -> Values:
     return {key: value for key, value in part.items() if key != name}
 
 
-def from_lowest_eave(part: dict[str, Any]) -> dict[str, Any]:
+def from_lowest_eave(part: Values) -> Values:
     """Return the part at its lowest eave, from which all heights of its sides count."""
     parameters = part["parameters"]
     eaves = [name for name in parameters if name in SIDED and name.startswith("eave_")]
@@ -79,7 +80,7 @@ def from_lowest_eave(part: dict[str, Any]) -> dict[str, Any]:
     return {**part, "parameters": {**parameters, **from_low}, "position": [x, y, z + smallest]}
 
 
-def with_sizes(part: dict[str, Any]) -> dict[str, Any]:
+def with_sizes(part: Values) -> Values:
     """Return the part with width and length, else of its outlines' smallest rectangle."""
     if all(name in part["parameters"] for name in PLAN_SIZES):
         return part
@@ -104,7 +105,7 @@ def make_polygon(rings: list[Any]) -> shapely.Geometry:
     return repair_polygons(shapely.Polygon(rings[0], rings[1:]))
 
 
-def change_type(part: dict[str, Any], kind: str, sizes: dict[str, float]) -> dict[str, Any]:
+def change_type(part: Values, kind: str, sizes: dict[str, float]) -> Values:
     """Return the part as another type of the same eave, rise and rectangle, or `sizes`."""
     if not isinstance(kind, str) or kind not in CATALOGUE:
         raise InputError(f"expected a roof type ({', '.join(CATALOGUE)}), got {kind!r}; choose one")
@@ -113,7 +114,7 @@ def change_type(part: dict[str, Any], kind: str, sizes: dict[str, float]) -> dic
     return {**part, "type": kind, "parameters": CATALOGUE[kind].typical(width, length, rise)}
 
 
-def side_by_side(part: dict[str, Any]) -> dict[str, Any]:
+def side_by_side(part: Values) -> Values:
     """Return the part with pitches and eaves of sides; raises InputError where it has none."""
     parameters = part["parameters"]
     if SIDED & parameters.keys():
@@ -129,7 +130,7 @@ def side_by_side(part: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def measure_rise(part: dict[str, Any]) -> float:
+def measure_rise(part: Values) -> float:
     """Return the height of the part's ridge or top over its lowest eave [m]."""
     if part["type"] == "flat":
         return 0.0
@@ -155,7 +156,7 @@ def measure_member_rise(member: Member) -> float:
     return float(min(*reach, member.top, math.inf) - member.base)
 
 
-def with_ridge(part: dict[str, Any], z_ridge: float) -> dict[str, Any]:
+def with_ridge(part: Values, z_ridge: float) -> Values:
     """Return the part with its ridge or top at `z_ridge` about the origin; eaves stay."""
     if part["type"] == "flat":
         return {**part, "position": [*part["position"][:2], z_ridge]}

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..data_files import Values
 from ..errors import InputError
 from ..model import Building, Quality
 from ..status import Status
@@ -47,7 +48,7 @@ def convert_to_plain(value: Any) -> Any:
     return [convert_to_plain(item) for item in value] if isinstance(value, (list, tuple)) else value
 
 
-def new_part(change: dict[str, Any], z_origin: float) -> dict[str, Any]:
+def new_part(change: Values, z_origin: float) -> Values:
     """Return a new part, given at least its type, position, width and length."""
     missing = [name for name in ("type", "position", "width", "length") if change.get(name) is None]
     if missing:
@@ -72,7 +73,7 @@ def without_part(building: Building, index: int) -> Building:
     return rebuild(building, {**record, "parts": [*parts[:index], *parts[index + 1 :]]})
 
 
-def rebuild(building: Building, record: dict[str, Any]) -> Building:
+def rebuild(building: Building, record: Values) -> Building:
     """Return the building of a changed record, composed as it was, without old figures."""
     result = build(
         {**record, "status": Status.MODELLED.code, "quality": None, "detail": BY_HAND},

@@ -7,13 +7,13 @@ status of its own. Points and overrides count before it.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import shapely
 
+from ..data_files import Values
 from ..errors import CompositionError, SettingsError
 from ..model import Building
 from ..read.numbers import read_number
@@ -64,7 +64,7 @@ def split_roof_column(read: ReadSettings) -> tuple[str, bool]:
     return name.removeprefix(ABOVE_GROUND), name.startswith(ABOVE_GROUND)
 
 
-def read_fallback(attributes: Mapping[str, Any], read: ReadSettings) -> FallbackHeights:
+def read_fallback(attributes: Values, read: ReadSettings) -> FallbackHeights:
     """Read the fallback heights in a footprint's attributes.
 
     What no building can have, such as -9999, is unknown.

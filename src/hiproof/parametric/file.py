@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from ..data_files import Values
 from ..errors import InputError, SettingsError
 from ..read.crs import parse_crs
 from ..read.models.cityjson import ESCAPED
@@ -20,10 +21,10 @@ from .record import read_update, read_value
 
 HEAD_KEY = "hiproof_parameters"
 # This very object stands for a line that cannot be read.
-DAMAGED: dict[str, Any] = {"damaged": True}
+DAMAGED: Values = {"damaged": True}
 
 
-def read_parameters(path: str | os.PathLike[str]) -> list[dict[str, Any]]:
+def read_parameters(path: str | os.PathLike[str]) -> list[Values]:
     """Read the objects of all buildings in a parameters.jsonl, in its order.
 
     Raises InputError when it cannot be read or is no such file, naming line and column where its
@@ -36,7 +37,7 @@ def read_parameters(path: str | os.PathLike[str]) -> list[dict[str, Any]]:
 @contextmanager
 def opened_parameters(
     path: str | os.PathLike[str], damaged: Damaged = refuse
-) -> Iterator[tuple[FileHead, Iterator[dict[str, Any]]]]:
+) -> Iterator[tuple[FileHead, Iterator[Values]]]:
     """Yield the head of the parameters.jsonl at `path`, and its buildings.
 
     Buildings come one by one. A line that cannot be read is told to `damaged`, which refuses the
@@ -49,7 +50,7 @@ def opened_parameters(
 @contextmanager
 def locate_parameters(
     path: str | os.PathLike[str], damaged: Damaged = refuse
-) -> Iterator[tuple[FileHead, Iterator[tuple[int, dict[str, Any]]]]]:
+) -> Iterator[tuple[FileHead, Iterator[tuple[int, Values]]]]:
     """Do as `opened_parameters`, with the place of each building for `read_at`."""
     try:
         with Path(path).open("rb") as file:
@@ -138,7 +139,7 @@ def read_head(record: Any, path: str | os.PathLike[str]) -> FileHead:
 
 def records(
     lines: Iterator[tuple[int, int, Any]], path: str | os.PathLike[str], damaged: Damaged = refuse
-) -> Iterator[tuple[int, dict[str, Any]]]:
+) -> Iterator[tuple[int, Values]]:
     """Yield (place, object) of the buildings after the head. Raises InputError for a second one."""
     for number, start, record in lines:
         if isinstance(record, dict) and HEAD_KEY in record:

@@ -15,6 +15,7 @@ import numpy as np
 import shapely
 from pyproj import CRS
 
+from ..data_files import Values
 from ..errors import HiproofError, InputError, warn
 from ..evaluate.metrics import plan_outline
 from ..evaluate.models import BuildingModel, read_models, run_models
@@ -55,7 +56,7 @@ class Run:
 
     path: Path
     head: FileHead
-    record: dict[str, Any]
+    record: Values
 
     @property
     def crs(self) -> Any:
@@ -91,7 +92,7 @@ def open_run(path: str | os.PathLike[str], crs: Any = None) -> Run:
     return Run(file, read_file_head(file, record, parse_crs(crs)), record)
 
 
-def read_file_head(file: Path, record: dict[str, Any], crs: Any = None) -> FileHead:
+def read_file_head(file: Path, record: Values, crs: Any = None) -> FileHead:
     """Read the head of models; their CRS is `crs`, else that of the file, else of `record`."""
     if is_parameters(file):
         with opened_parameters(file) as (head, _):

@@ -18,7 +18,7 @@ An override is an object with the building's `id` and any of
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -26,6 +26,7 @@ import numpy as np
 import shapely
 
 from ..compose.readable import MOST_PARTS
+from ..data_files import Values
 from ..errors import FitError, HiproofError, InputError
 from ..frames import LocalFrame
 from ..model import Building, Footprint, as_xyz
@@ -81,7 +82,7 @@ class Override:
     type: str | None = None
     types: tuple[str, ...] = ()
     most_parts: int | None = None
-    parts: list[dict[str, Any]] | None = None
+    parts: list[Values] | None = None
     origin: np.ndarray | None = None
     outline: list[Any] | None = None
     fixed: dict[str, float] = field(default_factory=dict)
@@ -91,7 +92,7 @@ class Override:
     told: str = ""
 
 
-def read_override(record: Mapping[str, Any]) -> Override:
+def read_override(record: Values) -> Override:
     """Read an override from an object.
 
     Raises InputError, one sentence, where it cannot be or contradicts itself.
@@ -160,7 +161,7 @@ def check_number(key: str, value: Any, where: str) -> float:
     return result
 
 
-def refuse_contradictions(record: Mapping[str, Any], has_list: bool, where: str) -> None:
+def refuse_contradictions(record: Values, has_list: bool, where: str) -> None:
     """Raise InputError where values exclude each other, or one is neither yes nor no."""
     if record.get("leave_out", False) not in (True, False):
         raise InputError(
@@ -185,7 +186,7 @@ def refuse_contradictions(record: Mapping[str, Any], has_list: bool, where: str)
         )
 
 
-def read_types(record: Mapping[str, Any], where: str) -> tuple[str, ...]:
+def read_types(record: Values, where: str) -> tuple[str, ...]:
     """Read the types, commas between them, that parts may have, none without any."""
     given_types = record.get("types", ())
     names = given_types.split(",") if isinstance(given_types, str) else given_types
@@ -205,7 +206,7 @@ def read_types(record: Mapping[str, Any], where: str) -> tuple[str, ...]:
     return types
 
 
-def describe_override(record: Mapping[str, Any], has_list: bool) -> str:
+def describe_override(record: Values, has_list: bool) -> str:
     """Describe the override in words, for the building's detail."""
     phrases = [
         f"{name} {record[name]}"
@@ -345,7 +346,7 @@ def build_over_ground(
     )
 
 
-def describe_block(rings: Any, z_local: float) -> dict[str, Any]:
+def describe_block(rings: Any, z_local: float) -> Values:
     """Return the object of a level part over the outline `rings`."""
     position = [0.0, 0.0, z_local]
     rows = {"type": "flat", "parameters": {}, "position": position, "rotation": 0.0}

@@ -21,6 +21,7 @@ from ..compose.settle import (
     settled_outline,
     settled_sigma,
 )
+from ..data_files import Values
 from ..errors import InputError
 from ..frames import LocalFrame, turn_points
 from ..geometry.rings import intersect, repair_polygons
@@ -28,6 +29,7 @@ from ..model import Building, Part, Quality, Roof
 from ..model.installation import CHIMNEY, ROOF_OBJECT
 from ..model.overhang import ROOF_EDGE, WALLS
 from ..primitives.catalogue import CATALOGUE
+from ..primitives.contract import Parameters
 from ..primitives.parameters import refuse_no_shape
 from ..read.crs import NAMED_UNITS
 from ..read.models.damage import excerpt
@@ -63,7 +65,7 @@ LISTED = {
 }
 
 
-def read_object(value: Any, table: str, label: str = "") -> dict[str, Any]:
+def read_object(value: Any, table: str, label: str = "") -> Values:
     """Read an object by the types that its table declares, InputError for what is of no such.
 
     What is left out stays out, unless the table requires it. `label` is what a sentence calls the
@@ -114,7 +116,7 @@ def read_building(record: Mapping[str, Any]) -> tuple[Building, Roof | None]:
     return make_building(read_object(record, "building"))
 
 
-def make_building(values: Mapping[str, Any]) -> tuple[Building, Roof | None]:
+def make_building(values: Values) -> tuple[Building, Roof | None]:
     """Make the building of values that were read, and its roof, as `read_building` does."""
     status, parts, outline = choose_status(values), values.get("parts"), values.get("outline")
     roof = make_roof(parts, outline, values.get("origin")) if parts else None
@@ -142,7 +144,7 @@ def make_building(values: Mapping[str, Any]) -> tuple[Building, Roof | None]:
     return building, roof
 
 
-def choose_status(values: Mapping[str, Any]) -> Status:
+def choose_status(values: Values) -> Status:
     """Return the status; a building with parts by hand has that of a model."""
     status = next((one for one in Status if one.code == values.get("status")), None)
     if values.get("parts"):
@@ -175,7 +177,7 @@ def on_grid(outline: shapely.Polygon) -> shapely.Polygon:
 
 
 def make_roof(
-    parts: list[dict[str, Any]], outline: shapely.Polygon | None, origin: np.ndarray | None
+    parts: list[Values], outline: shapely.Polygon | None, origin: np.ndarray | None
 ) -> Roof:
     """Return the roof of a building's parts over its outline, about its origin."""
     if outline is None or origin is None:
@@ -190,7 +192,7 @@ def make_roof(
     return roof
 
 
-def make_part(values: Mapping[str, Any], outline: shapely.Polygon, label: str) -> Part:
+def make_part(values: Values, outline: shapely.Polygon, label: str) -> Part:
     """Make a part with its planes, over the building's outline if it has none of its own."""
     kind = values["type"]
     refuse_no_shape(kind, values["parameters"], label)
@@ -210,7 +212,7 @@ def make_part(values: Mapping[str, Any], outline: shapely.Polygon, label: str) -
     return Part(kind, pieces, parameters, kappa, position, settled_sigma(sigma))
 
 
-def read_position(values: Mapping[str, Any], label: str) -> tuple[np.ndarray, float]:
+def read_position(values: Values, label: str) -> tuple[np.ndarray, float]:
     """Read where a part or an installation lies (3,) about the origin, and its rotation in rad."""
     position = np.array([measure(value, f"position of {label}") for value in values["position"]])
     return round_values(position, DIGITS), math.radians(round_number(values.get("rotation", 0.0)))
@@ -218,7 +220,7 @@ def read_position(values: Mapping[str, Any], label: str) -> tuple[np.ndarray, fl
 
 def cut_plan(
     kind: str,
-    parameters: Mapping[str, float],
+    parameters: Parameters,
     position: np.ndarray,
     kappa: float,
     outline: shapely.Polygon,
@@ -247,7 +249,7 @@ def clip(area: shapely.Polygon, outline: shapely.Polygon) -> list[shapely.Polygo
 
 def by_teeth(
     outlines: list[shapely.Polygon],
-    parameters: Mapping[str, float],
+    parameters: Parameters,
     position: np.ndarray,
     kappa: float,
 ) -> list[shapely.Polygon]:
@@ -271,7 +273,7 @@ def by_teeth(
     return cut
 
 
-def read_terrain_lines(record: Mapping[str, Any]) -> list[np.ndarray]:
+def read_terrain_lines(record: Values) -> list[np.ndarray]:
     """Read the terrain's lines (m, 3) along the outline of a building's object."""
     return read_lines(record.get("terrain_line"), "terrain_line")
 
@@ -296,13 +298,13 @@ def read_places(rows: list[Any], label: str) -> np.ndarray:
     return np.array([place(row, label) for row in rows])
 
 
-def read_change(record: Mapping[str, Any]) -> dict[str, Any] | None:
+def read_change(record: Values) -> Values | None:
     """Read what the last update found of a building, None where there is nothing."""
     change = record.get("change")
     return None if change is None else check_change(change, "change")
 
 
-def check_change(change: Any, label: str) -> dict[str, Any]:
+def check_change(change: Any, label: str) -> Values:
     """Check what an update found of a building, which is kept as it is written."""
     values = read_object(change, "change")
     for k, place in enumerate(values.get("places", ())):
@@ -326,12 +328,12 @@ def read_update(record: Any) -> UpdateHead:
     return UpdateHead(update["survey"], tuple(outside))
 
 
-def refuse_other_kinds(record: Mapping[str, Any]) -> None:
+def refuse_other_kinds(record: Values) -> None:
     """Raise InputError where a value is of another kind than a run writes."""
     choose_status(read_object(record, "building"))
 
 
-def require_mapping(value: Any, label: str) -> Mapping[str, Any]:
+def require_mapping(value: Any, label: str) -> Values:
     if not isinstance(value, dict):
         raise InputError(f"expected an object as {label}, got {excerpt(value)}; write {{...}}")
     return value
@@ -415,7 +417,7 @@ def read_figures(values: Any, label: str) -> dict[str, float]:
     return {name: read_figure(value, name) for name, value in mapping.items()}
 
 
-def read_shift(record: Mapping[str, Any]) -> tuple[float, float]:
+def read_shift(record: Values) -> tuple[float, float]:
     """Read how far the footprint was moved; one made by hand was not."""
     return read_pair(record.get("shift", [0.0, 0.0]), "shift")
 

@@ -19,9 +19,11 @@ import numpy as np
 import shapely
 
 from ..compose.settle import make_pieces
+from ..data_files import Values
 from ..errors import FitError, InputError
 from ..model import Building, Part, Roof, as_xyz
 from ..primitives.catalogue import CURVED
+from ..primitives.contract import Parameters
 from ..primitives.parameters import SIDED, refuse_no_shape
 from ..primitives.table import PARAMETER_ROWS, evaluate
 from ..write.parameters import building_record
@@ -129,7 +131,7 @@ def list_unknowns(parts: tuple[Part, ...], fixed: Mapping[int, Collection[str]])
     return Unknowns(tuple((row[0], row[1]) for row in rows), start, lower - 1e-9, upper + 1e-9)
 
 
-def find_bounds(name: str, parameters: Mapping[str, float]) -> tuple[float, float]:
+def find_bounds(name: str, parameters: Parameters) -> tuple[float, float]:
     """Return the bounds in which a parameter makes a roof over its rectangle."""
     if bounds := PARAMETER_ROWS.get(name, {}).get("bounds"):
         return evaluate(bounds, {"width": UNBOUNDED_M, "length": UNBOUNDED_M} | dict(parameters))
@@ -308,9 +310,7 @@ def covariance(jacobian: np.ndarray, gaps: np.ndarray) -> np.ndarray:
     return np.linalg.pinv(jacobian.T @ jacobian, rcond=1e-10) * float(np.mean(gaps**2))
 
 
-def with_values(
-    part: dict[str, Any], values: Mapping[str, float], sigma: dict[str, float]
-) -> dict[str, Any]:
+def with_values(part: Values, values: Parameters, sigma: dict[str, float]) -> Values:
     """Return the part's object with fitted values, its z at the lowest eave again."""
     parameters = {name: values.get(name, value) for name, value in part["parameters"].items()}
     x, y, z = part["position"]

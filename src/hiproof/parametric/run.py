@@ -6,16 +6,16 @@ import dataclasses
 import json
 import os
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from itertools import chain
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import shapely
 
 from .. import __version__
+from ..data_files import Values
 from ..errors import HiproofError, InputError, OutputError, report_error
 from ..evaluate.run import list_run_inputs, run_record
 from ..formats import list_model_paths, list_requested_files
@@ -115,7 +115,7 @@ def build_file(
 
 
 def make_fragments(
-    records: Iterator[dict[str, Any]],
+    records: Iterator[Values],
     head: FileHead,
     built: Built,
     progress: Callable[[int], None],
@@ -132,7 +132,7 @@ def make_fragments(
 
 
 def build_texts(
-    record: dict[str, Any], names: tuple[str, str], head: FileHead
+    record: Values, names: tuple[str, str], head: FileHead
 ) -> tuple[Building, Fragments]:
     """Return an object's building and texts; without a model it keeps its parameters."""
     id = record["id"]
@@ -151,7 +151,7 @@ def build_texts(
     return building, texts | {"parameters": Fragment(dump(selection) + b"\n")}
 
 
-def offset_by(record: Mapping[str, Any] | None, units: FileUnits) -> np.ndarray:
+def offset_by(record: Values | None, units: FileUnits) -> np.ndarray:
     """Return the offset (3,) of a CityJSON file whose first building is `record`."""
     from .record import read_building
 
@@ -180,7 +180,7 @@ def write_record(path: Path, out: Path, head: FileHead, built: Built) -> None:
     save_text(out / "run.json", json.dumps(masked_values(record), indent=1) + "\n")
 
 
-def earlier_record(folder: Path, head: FileHead) -> dict[str, Any]:
+def earlier_record(folder: Path, head: FileHead) -> Values:
     """Return settings, inputs and surveys of the run in `folder`, if there is one.
 
     The way in which coordinates are written, and their units, are those of `head`, so that whoever

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-from typing import Any
 
+from ..data_files import Values
 from ..primitives.cants import MEASURES, MOST_CANTS
 from ..primitives.catalogue import CATALOGUE
 from ..write.attribute_list import DECLARED, TABLES
@@ -14,10 +14,10 @@ RECORDS = (
     *("head", "update", "roof_outside", "building", "part", "passage", "installation"),
     *("overhang", "change", "ended_model", "change_place"),
 )
-TYPE_SCHEMAS: dict[str, dict[str, Any]] = DECLARED["schemas"]
+TYPE_SCHEMAS: dict[str, Values] = DECLARED["schemas"]
 
 
-def schema() -> dict[str, Any]:
+def schema() -> Values:
     """Return the schema of a line.
 
     >>> schema()["$defs"]["head"]["properties"]["hiproof_parameters"]["const"]
@@ -35,7 +35,7 @@ def schema() -> dict[str, Any]:
     }
 
 
-def describe_record(name: str) -> dict[str, Any]:
+def describe_record(name: str) -> Values:
     """Return the schema of an object; only a head may have further keys."""
     table = TABLES[name]
     properties = {}
@@ -51,7 +51,7 @@ def describe_record(name: str) -> dict[str, Any]:
     }
 
 
-def describe_type(type: str) -> dict[str, Any]:
+def describe_type(type: str) -> Values:
     """Return the schema of a type, as data/attributes.toml names it.
 
     >>> describe_type("text?"), describe_type("passage[]")["items"]
@@ -71,7 +71,7 @@ def describe_type(type: str) -> dict[str, Any]:
     return {"$ref": f"#/$defs/{type}"} if type in RECORDS else TYPE_SCHEMAS[type]
 
 
-def parameters_by_type() -> list[dict[str, Any]]:
+def parameters_by_type() -> list[Values]:
     """Return what parameters of each type must hold, unless each side has its own."""
     sides = "(pitch|eave|skew)_(left|right|front|back)"
     cants = f"({'|'.join(MEASURES)})_cant[1-{MOST_CANTS}]"

@@ -16,10 +16,13 @@ of the eave (m), slope.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
+
+from ..data_files import Values
+from .contract import Parameters
 
 MOST_CANTS = 8  # of a member: with its four sides it has twelve
 MEASURES = ("facing", "distance", "eave", "pitch")
@@ -51,9 +54,9 @@ def turn_cants(cants: np.ndarray, quarters: int) -> np.ndarray:
     return turned
 
 
-def name_cant_values(cants: np.ndarray, base: Any) -> dict[str, Any]:
+def name_cant_values(cants: np.ndarray, base: Any) -> Values:
     """Return the cants' parameters by name, with T_L at the height `base`."""
-    words: dict[str, Any] = {}
+    words: Values = {}
     for cant, (facing, distance, eave, slope) in zip(CANTS, cants.swapaxes(0, 1), strict=False):
         once_round = 180.0 - np.remainder(180.0 - np.degrees(facing), 360.0)
         values = once_round, distance, eave - base, np.degrees(np.arctan(slope))
@@ -63,7 +66,7 @@ def name_cant_values(cants: np.ndarray, base: Any) -> dict[str, Any]:
     return words
 
 
-def read_cants(parameters: Mapping[str, float], base: float) -> np.ndarray:
+def read_cants(parameters: Parameters, base: float) -> np.ndarray:
     """Read cants (4, c) by name, T_L at the height `base`; raises KeyError if one is missing."""
     rows = [
         [parameters[f"{measure}_{cant}"] for measure in MEASURES] for cant in list_cants(parameters)
@@ -72,9 +75,7 @@ def read_cants(parameters: Mapping[str, float], base: float) -> np.ndarray:
     return np.array([np.radians(facing), distance, base + eave, np.tan(np.radians(pitch))])
 
 
-def keep_cants_in_place(
-    parameters: Mapping[str, float], along: float, across: float
-) -> dict[str, float]:
+def keep_cants_in_place(parameters: Parameters, along: float, across: float) -> dict[str, float]:
     """Return parameters that keep the cants' walls where they are.
 
     The middle of the part's rectangle went `along` and `across`.

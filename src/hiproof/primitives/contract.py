@@ -42,6 +42,7 @@ SIDES = ("left", "right", "front", "back")
 LEFT, RIGHT, FRONT, BACK, LEVEL = range(5)  # the side that a plane rises from: -u, +u, -v, +v, none
 
 Plane = tuple[Formula | float, Formula | float, Formula | float]
+Parameters = Mapping[str, float]  # theta_p by name
 Shape = tuple[float, ...]  # V, U, q0..q3
 # The corners of a plan as shares of its half extents.
 RECTANGLE = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
@@ -123,8 +124,8 @@ class Primitive:
     measures: Mapping[str, Formula]
     eave: Formula
     planes: tuple[Plane, ...]
-    shape: Callable[[Mapping[str, float]], Shape]
-    corners: Callable[[Mapping[str, float]], Corners]
+    shape: Callable[[Parameters], Shape]
+    corners: Callable[[Parameters], Corners]
     faces: tuple[tuple[int, ...], ...]
     typical: Callable[[float, float, float], dict[str, float]]
     bounds: tuple[tuple[float, float], ...] = ()
@@ -136,8 +137,8 @@ class Primitive:
     strips: int = 1
     minima: tuple[int, ...] = ()
     more: tuple[Primitive, ...] = ()
-    choose: Callable[[Mapping[str, float]], int] | None = None
-    refine: Callable[[Mapping[str, float], float], Primitive] | None = None
+    choose: Callable[[Parameters], int] | None = None
+    refine: Callable[[Parameters, float], Primitive] | None = None
     rim: tuple[tuple[float, float], ...] = RECTANGLE
     draw: Callable[[np.random.Generator, float], dict[str, float]] | None = None
     read_member: Callable[[Any], tuple[float, ...]] | None = None
@@ -177,14 +178,14 @@ class Primitive:
         is_rectangular = self.strips == 1 and self.rim == RECTANGLE
         return is_rectangular and len(set(self.sides)) == len(self.sides)
 
-    def variant(self, theta_p: Mapping[str, float]) -> Primitive:
+    def variant(self, theta_p: Parameters) -> Primitive:
         """Return the variant with the teeth, facets or parameters of `theta_p`, else itself."""
         if self.choose is not None:
             return self.variants[self.choose(theta_p)]
         matching = [variant for variant in self.variants if set(variant.parameters) <= set(theta_p)]
         return max(matching, key=lambda variant: len(variant.parameters), default=self)
 
-    def vertices(self, theta_p: Mapping[str, float]) -> np.ndarray:
+    def vertices(self, theta_p: Parameters) -> np.ndarray:
         """Return vertices (n, 3), S = f(theta_p); raises FitError where a parameter is missing."""
         shape = self.variant(theta_p)
         missing = [name for name in shape.parameters if name not in theta_p]
@@ -213,7 +214,7 @@ class Primitive:
 
     def to_theta(
         self,
-        theta_p: Mapping[str, float],
+        theta_p: Parameters,
         kappa: float = 0.0,
         translation: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0),
     ) -> np.ndarray:
@@ -303,7 +304,7 @@ class Primitive:
         planes[:, 2] -= planes[:, :2] @ theta[[CX, CY]]
         return planes
 
-    def part(self, theta: np.ndarray, sigma: Mapping[str, float] | None = None) -> Part:
+    def part(self, theta: np.ndarray, sigma: Parameters | None = None) -> Part:
         """Return the part of `theta` (9,) in its frame, a rectangle a tooth, or its own plan."""
         theta_p, kappa, translation = self.from_theta(theta)
         planes = self.planes_at(theta)

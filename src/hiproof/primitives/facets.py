@@ -7,7 +7,7 @@ and volumes hold. Stretched in one axis, it is an ellipse.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .algebra import Formula, U, V, q1
-from .contract import Plane, Primitive
+from .contract import Parameters, Plane, Primitive
 
 # Farthest (m) that a facet's edge may lie off the circle that it stands for while it is fitted, the
 # default of the setting `compose.chord_tolerance_m`.
@@ -29,7 +29,7 @@ NUMERICAL_ZERO = 1e-12  # A smaller share is none.
 
 def with_facets(
     make: Callable[..., Primitive],
-    measure: Callable[[Mapping[str, float]], float] = lambda p: p["length"],
+    measure: Callable[[Parameters], float] = lambda p: p["length"],
     side_counts: tuple[int, ...] = SIDE_COUNTS,
     chords: int = 0,
     rise: str = "",
@@ -45,7 +45,7 @@ def with_facets(
     """
     most = max(side_counts)
 
-    def refine(p: Mapping[str, float], chord_m: float) -> Primitive:
+    def refine(p: Parameters, chord_m: float) -> Primitive:
         sides = find_sides(measure(p) / 2, chord_m)
         if not chords:
             return make(sides)

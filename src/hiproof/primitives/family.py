@@ -24,7 +24,6 @@ Where walls cut a corner of the rectangle off it may have planes over these, too
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -32,6 +31,7 @@ from typing import Any
 import numpy as np
 import shapely
 
+from ..data_files import Values
 from ..errors import FitError
 from ..model import Part, Piece
 from .cants import compute_cant_planes, name_cant_values, no_cants, read_cants, turn_cants
@@ -47,6 +47,7 @@ from .contract import (
     Q0,
     RIGHT,
     SIDES,
+    Parameters,
     Primitive,
 )
 
@@ -307,7 +308,7 @@ class Member:
         parameters = {name: float(value) for name, value in self.list_side_measures().items()}
         return parameters, self.kappa, np.array([*self.centre, self.base])
 
-    def list_side_measures(self) -> dict[str, Any]:
+    def list_side_measures(self) -> Values:
         """Return each side's own parameters by name."""
         parameters, base = {"width": 2.0 * self.half[1], "length": 2.0 * self.half[0]}, self.base
         if self.has_top:
@@ -319,7 +320,7 @@ class Member:
                 parameters[f"skew_{SIDES[side]}"] = degrees(self.leans[side])
         return parameters | name_cant_values(self.cants, base)
 
-    def measure_as(self, shape: Primitive | None, kappa: float) -> dict[str, Any]:
+    def measure_as(self, shape: Primitive | None, kappa: float) -> Values:
         """Return the parameters and t_z that this member has as `shape`, by name.
 
         Each of several has its own. Without a shape they are side by side. They are seen from
@@ -396,7 +397,7 @@ def name_among(name: str, allowed: tuple[str, ...]) -> str | None:
 
 
 def compute_planes(
-    name: str, parameters: Mapping[str, float], kappa: float, translation: np.ndarray
+    name: str, parameters: Parameters, kappa: float, translation: np.ndarray
 ) -> np.ndarray:
     """Return the planes (k, 3) over x, y of a roof type with its parameters.
 
@@ -414,9 +415,7 @@ def compute_planes(
     return read_member(name, parameters, kappa, translation).planes()
 
 
-def read_member(
-    name: str, parameters: Mapping[str, float], kappa: float, translation: np.ndarray
-) -> Member:
+def read_member(name: str, parameters: Parameters, kappa: float, translation: np.ndarray) -> Member:
     """Read a member of its parameters, the catalogue's or each side's; FitError without one."""
     if name not in CATALOGUE:
         raise FitError(
@@ -445,7 +444,7 @@ def read_member(
 
 
 def convert_to_member(
-    shape: Primitive, parameters: Mapping[str, float], kappa: float, translation: np.ndarray
+    shape: Primitive, parameters: Parameters, kappa: float, translation: np.ndarray
 ) -> Member:
     """Return the member of the same surface as the catalogue's `shape`."""
     theta = shape.to_theta(parameters, kappa, translation)

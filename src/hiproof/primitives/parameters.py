@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from ..errors import FitError, InputError
 from .cants import CANTED, MEASURES, list_cants
 from .catalogue import CATALOGUE
-from .contract import LEVEL, SIDES
+from .contract import LEVEL, SIDES, Parameters
 from .family import COMPONENTS, list_eaves
 
 # Parameters of a member's sides and cants; a part that has one gives all of its shape side by side.
@@ -21,7 +21,7 @@ STEEPEST_DEG = 89.0
 MOST_SHOWN_NAMES = 8  # names in a sentence; more would hide what is said
 
 
-def refuse_no_shape(kind: str, parameters: Mapping[str, float], where: str) -> None:
+def refuse_no_shape(kind: str, parameters: Parameters, where: str) -> None:
     """Raise InputError where `parameters` make no shape of the type `kind`.
 
     `parameters` are finite numbers by name.
@@ -52,7 +52,7 @@ def refuse_no_shape(kind: str, parameters: Mapping[str, float], where: str) -> N
 
 def refuse_other_names(
     kind: str,
-    parameters: Mapping[str, float],
+    parameters: Parameters,
     required: Sequence[str],
     allowed: Sequence[str],
     where: str,
@@ -72,7 +72,7 @@ def refuse_other_names(
         )
 
 
-def refuse_falling(kind: str, parameters: Mapping[str, float], where: str) -> None:
+def refuse_falling(kind: str, parameters: Parameters, where: str) -> None:
     """Raise InputError where a plane falls from its eave or stands upright."""
     shape = CATALOGUE[kind]
     try:
@@ -94,7 +94,7 @@ def refuse_falling(kind: str, parameters: Mapping[str, float], where: str) -> No
         )
 
 
-def refuse_no_member(kind: str, parameters: Mapping[str, float], where: str) -> None:
+def refuse_no_member(kind: str, parameters: Parameters, where: str) -> None:
     """Raise InputError where each side's parameters make no member of the family."""
     if kind in COMPONENTS:
         refuse_other_names(kind, parameters, list(CATALOGUE[kind].parameters), [], where)

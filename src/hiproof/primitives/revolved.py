@@ -7,15 +7,15 @@ ridge. An onion is a bulge, and above its neck a hollow pointed top.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
 from typing import Any
 
 import numpy as np
 
+from ..data_files import Values
 from .algebra import Formula, V, q0, q1, q2
-from .contract import Corners, Plane, Primitive
+from .contract import Corners, Parameters, Plane, Primitive
 from .facets import (
     PROFILE_DEG,
     SIDE_COUNTS,
@@ -36,7 +36,7 @@ def revolve(
     sides: int,
     profile: ChordProfile,
     eave: Formula,
-    constants: Mapping[str, float] | None = None,
+    constants: Values | None = None,
     **changes: Any,
 ) -> Primitive:
     """Return the shape of a row whose profile is turned, in so many facets around."""
@@ -45,7 +45,7 @@ def revolve(
     for height, fall in profile.chords:
         planes += make_facet_planes(sides, find_apothem(sides), fall, eave + height)
 
-    def corners(p: Mapping[str, float]) -> Corners:
+    def corners(p: Parameters) -> Corners:
         """Return the apex, then ring by ring the corners of the facets, last the eave's."""
         values, ring = shape.shape(p), np.array(rim) * (p["length"] / 2, p["width"] / 2)
         rings = [
@@ -132,7 +132,7 @@ def make_barrel(splits: int = 1) -> Primitive:
     heights = profile.heights[:0:-1] + profile.heights
     chords = [(fall, EAVE + height) for height, fall in profile.chords]
 
-    def corners(p: Mapping[str, float]) -> Corners:
+    def corners(p: Parameters) -> Corners:
         """Return pairs at -u and +u, from the eave at -v to the eave at +v."""
         u, v, values = p["length"] / 2, p["width"] / 2, vault.shape(p)
         return [

@@ -1,16 +1,16 @@
 """Shed (saw-tooth, CityGML 1100): 2 to 6 equal monopitches in a row."""
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 from ..errors import FitError
+from .contract import Parameters
 from .table import make_shape
 
 # of a saw-tooth that is one primitive; longer rows are put together from volumes
 TEETH = range(2, 7)
 
 
-def choose_teeth(p: Mapping[str, float]) -> int:
+def choose_teeth(p: Parameters) -> int:
     """Return the place in TEETH of a saw-tooth's number of teeth; raises FitError for others."""
     teeth = p.get("teeth", TEETH[0])
     if teeth not in TEETH:

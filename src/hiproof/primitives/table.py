@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ..data_files import read_data_file
+from ..data_files import Values, read_data_file
 from .algebra import SYMBOLS, U, V, formula, q0, q1, q2, q3
 from .contract import (
     HALF_LENGTH,
@@ -26,6 +26,7 @@ from .contract import (
     SLOPE_MIN,
     SPIRE_SLOPE_MAX,
     DerivedStart,
+    Parameters,
     Primitive,
     Shape,
     Vote,
@@ -37,8 +38,8 @@ LIMITS = {
     "spire": (SLOPE_MIN, SPIRE_SLOPE_MAX),
     "steepest": SLOPE_MAX,
 }
-BASICS: dict[str, Any] = {"__builtins__": {}, "pi": math.pi, "min": min, "max": max, "range": range}
-SHAPE_ROWS: dict[str, dict[str, Any]] = read_data_file("shapes")
+BASICS: Values = {"__builtins__": {}, "pi": math.pi, "min": min, "max": max, "range": range}
+SHAPE_ROWS: dict[str, Values] = read_data_file("shapes")
 PARAMETER_ROWS: dict[str, dict[str, str]] = read_data_file("measures")
 for name, row in SHAPE_ROWS.items():
     SHAPE_ROWS[name] = SHAPE_ROWS.get(row.get("like", ""), {}) | row
@@ -49,9 +50,7 @@ def compile_text(text: str) -> CodeType:
     return compile(f"({text})", "shapes.toml", "eval")
 
 
-def evaluate(
-    text: str, names: Mapping[str, Any], definitions: Mapping[str, str] | None = None
-) -> Any:
+def evaluate(text: str, names: Values, definitions: Mapping[str, str] | None = None) -> Any:
     """Return the value of an expression, with the values of `definitions` named.
 
     Raises KeyError for a name that has no value.
@@ -72,16 +71,16 @@ def evaluate(
 class RowFunctions:
     """What a row's expressions say of parameters; they may name `constants`."""
 
-    row: Mapping[str, Any]
-    constants: Mapping[str, Any]
+    row: Values
+    constants: Values
     names: tuple[str, ...]
 
-    def shape(self, p: Mapping[str, float]) -> Shape:
+    def shape(self, p: Parameters) -> Shape:
         v, u = p["width"] / 2, p["length"] / 2
         q = evaluate(self.row["q"], {**p, **self.constants, "u": u, "v": v})
         return (v, u, *q, *[0.0] * (4 - len(q)))
 
-    def corners(self, p: Mapping[str, float]) -> Any:
+    def corners(self, p: Parameters) -> Any:
         names = {**p, **self.constants, "u": p["length"] / 2, "v": p["width"] / 2}
         return evaluate(self.row["corners"], names, self.row.get("where"))
 
@@ -98,7 +97,7 @@ class RowFunctions:
         }
         return self.choose_sizes(self.row["draw"], {"width": width, **chances})
 
-    def choose_sizes(self, texts: Mapping[str, str], names: Mapping[str, Any]) -> dict[str, float]:
+    def choose_sizes(self, texts: Mapping[str, str], names: Values) -> dict[str, float]:
         """Return the parameters of sizes that are chosen one after the other."""
         chosen = {**self.constants, **names}
         for name, text in texts.items():
@@ -106,7 +105,7 @@ class RowFunctions:
         return {name: chosen[name] for name in self.names}
 
 
-def make_shape(key: str, constants: Mapping[str, Any] | None = None, **changes: Any) -> Primitive:
+def make_shape(key: str, constants: Values | None = None, **changes: Any) -> Primitive:
     """Return a row's shape with `changes`; its expressions may name `constants`."""
     row, constants = SHAPE_ROWS[key], constants or {}
     symbols = {**FORMULAS, **constants}
@@ -115,7 +114,7 @@ def make_shape(key: str, constants: Mapping[str, Any] | None = None, **changes: 
     }
     functions = RowFunctions(row, constants, tuple(measures))
     citygml_code, adv_code, *osm_shapes = row["codes"]
-    fields: dict[str, Any] = {
+    fields: Values = {
         "name": row.get("variant_of", key),
         "citygml_code": citygml_code,
         "adv_code": adv_code,
@@ -147,7 +146,7 @@ def make_shape(key: str, constants: Mapping[str, Any] | None = None, **changes: 
     return Primitive(**fields | changes)
 
 
-def read_starts(rows: list[dict[str, Any]], symbols: dict[str, Any]) -> tuple[DerivedStart, ...]:
+def read_starts(rows: list[Values], symbols: Values) -> tuple[DerivedStart, ...]:
     """Return a start for each of the quarters of each row."""
     return tuple(
         DerivedStart(
@@ -161,7 +160,7 @@ def read_starts(rows: list[dict[str, Any]], symbols: dict[str, Any]) -> tuple[De
     )
 
 
-def turn_where(rule: Mapping[str, Any], theta: np.ndarray) -> np.ndarray:
+def turn_where(rule: Values, theta: np.ndarray) -> np.ndarray:
     """Return the surface of theta (9,), its axes turned where the rule holds."""
     names = dict(zip(SYMBOLS, theta[HALF_WIDTH:].tolist(), strict=True))
     if not evaluate(rule["when"], names, rule.get("where")):
@@ -174,7 +173,7 @@ def turn_where(rule: Mapping[str, Any], theta: np.ndarray) -> np.ndarray:
     return turned
 
 
-def name_member(member: Any) -> dict[str, Any]:
+def name_member(member: Any) -> Values:
     """Return by name what a row may say of a member of the family."""
     names = {"v": member.half[1], "ridge": member.apex(1), "top": member.top}
     for side, slope, eave in zip(SIDES, member.slopes, member.eaves, strict=True):

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from ..data_files import read_data_file
+from ..data_files import Values, read_data_file
 from ..formats import FORMATS
 from ..primitives.catalogue import CATALOGUE
 from ..primitives.contract import SIDES
@@ -74,7 +74,7 @@ def make_attribute(name: str, type: str, unit: str, meaning: str) -> Attribute:
     return Attribute(name, describe_type(type), unit, meaning, type)
 
 
-def read_table(row: Mapping[str, Any], earlier: Mapping[str, AttributeTable]) -> AttributeTable:
+def read_table(row: Values, earlier: Mapping[str, AttributeTable]) -> AttributeTable:
     """Read a declared table, which may include attributes of `earlier` ones."""
     included = [
         attribute._replace(name=earlier[name].prefix + attribute.name)

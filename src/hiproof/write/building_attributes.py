@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import shapely
 
 from ..compose.settle import round_number
+from ..data_files import Values
 from ..frames import METRES, Units
 from ..model import ROOF, Building, Solid
 from ..model.roof_figures import RoofFigures, find_ground_height, roof_figures
@@ -46,7 +46,7 @@ def measure_terrain(lines: tuple[np.ndarray, ...]) -> tuple[float, float, float]
 ONE_ENDED = ("side_hip", "side_half_hip")
 
 
-def osm_tags(building: Building, figures: RoofFigures | None) -> dict[str, Any]:
+def osm_tags(building: Building, figures: RoofFigures | None) -> Values:
     """Return the tags by name, in the order of their table.
 
     None what cannot be told or, of a flat roof, has no meaning.
@@ -111,7 +111,7 @@ def building_attributes(
     prefix: str = PREFIX,
     units: Units = METRES,
     osm: bool = False,
-) -> dict[str, Any]:
+) -> Values:
     """Return a building's attributes by name, in a fixed order.
 
     They are the input's own, roofer's (`prefix`), ours (`hiproof_`), and with `osm` the tags of
@@ -120,7 +120,7 @@ def building_attributes(
     in a file whose coordinates are in other `units`, which `hiproof_units` then says. What each is
     stands in data/attributes.toml.
     """
-    further: dict[str, Any] = {}
+    further: Values = {}
     if building.built is not None:
         counts = {
             "installations": len(building.built.installations),
@@ -146,7 +146,7 @@ def building_attributes(
     return given | {name: plain(value) for name, value in computed.items()}
 
 
-def add_prefix(prefix: str, values: Mapping[str, Any]) -> dict[str, Any]:
+def add_prefix(prefix: str, values: Values) -> Values:
     return {prefix + name: value for name, value in values.items()}
 
 
@@ -156,7 +156,7 @@ QUALITY_FIGURES = (
 )
 
 
-def roofer_attributes(building: Building, figures: RoofFigures | None) -> dict[str, Any]:
+def roofer_attributes(building: Building, figures: RoofFigures | None) -> Values:
     """Return the attributes that users of roofer and 3DBAG expect, unprefixed."""
     quality, values = building.quality, dict.fromkeys(TABLES["roofer"].names)
     values |= {
@@ -179,7 +179,7 @@ def roofer_attributes(building: Building, figures: RoofFigures | None) -> dict[s
     return values
 
 
-def shape_attributes(figures: RoofFigures) -> dict[str, Any]:
+def shape_attributes(figures: RoofFigures) -> Values:
     """Return heights and volume, without prefix."""
     heights = {f"h_roof_{name}": metres(getattr(figures, f"h_{name}")) for name in ROOF_HEIGHTS}
     return {**heights, "volume_lod22": round_number(figures.volume_m3, 4)}
@@ -187,7 +187,7 @@ def shape_attributes(figures: RoofFigures) -> dict[str, Any]:
 
 def hiproof_attributes(
     building: Building, figures: RoofFigures | None = None, units: Units = METRES
-) -> dict[str, Any]:
+) -> Values:
     """Return our own attributes, without prefix."""
     quality, kind = building.quality, building.type
     recognised = max(building.recognised, key=building.recognised.__getitem__, default="")
@@ -215,9 +215,9 @@ def hiproof_attributes(
     }
 
 
-def change_attributes(change: Mapping[str, Any]) -> dict[str, Any]:
+def change_attributes(change: Values) -> Values:
     """Return the attributes of a building's last change, without prefix."""
-    place: Mapping[str, Any] = next(iter(change["places"]), {})
+    place: Values = next(iter(change["places"]), {})
     return {
         "change": change["class"],
         "change_kind": place.get("kind"),
@@ -241,7 +241,7 @@ def check_as_written(solid: Solid, units: Units) -> str:
     return json.dumps(sorted({finding.code for finding in check_solid(about_origin)}))
 
 
-def part_values(building: Building, number: int, visible: shapely.Geometry) -> dict[str, Any]:
+def part_values(building: Building, number: int, visible: shapely.Geometry) -> Values:
     """Return a part's values: type, `visible` area, place, parameters, deviations."""
     part = building.parts[number]
     x, y, z = building.roof.frame.to_world(part.translation)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from ..data_files import read_data_file
+from ..data_files import Values, read_data_file
 from ..primitives.catalogue import CATALOGUE, describe_type
 from ..status import Change
 
@@ -40,7 +38,7 @@ def type_colours() -> dict[str, str]:
     return {kind: type_colour(kind) for kind in (*CATALOGUE, "free", "unknown")}
 
 
-def page_colours() -> dict[str, Any]:
+def page_colours() -> Values:
     """Return what a page needs to colour models and to draw its legend."""
     return {
         "legends": {kind: list_legend(kind) for kind in CATALOGUE},

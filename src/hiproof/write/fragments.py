@@ -12,10 +12,11 @@ import zipfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 import numpy as np
 
+from ..data_files import Values
 from ..errors import OutputError
 from ..model import Building, Solid
 from ..model.roof_figures import RoofFigures, roof_figures
@@ -38,11 +39,11 @@ class Sheet:
 
     building: Building
     figures: RoofFigures | None
-    attributes: dict[str, Any]
+    attributes: Values
     head: FileHead
     name: str = ""
     gml_name: str = ""
-    surfaces: dict[int, dict[str, Any]] = field(default_factory=dict)
+    surfaces: dict[int, Values] = field(default_factory=dict)
     extension: str = ""
 
     @functools.cached_property
@@ -97,7 +98,7 @@ Fragments = dict[str, Fragment]  # one building's texts by the module that made 
 
 def save_fragments(file: BinaryIO, parts: Sequence[Fragments]) -> None:
     """Write the buildings `parts` to `file`, without compression."""
-    arrays: dict[str, Any] = {}
+    arrays: Values = {}
     for kind in parts[0] if parts else ():
         items = [part[kind] for part in parts]
         arrays[kind] = np.frombuffer(b"".join(fragment.text for fragment in items), np.uint8)

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..data_files import Values
 from ..settings import ComposeSettings, WriteSettings
 from .attribute_list import PREFIX
 from .naming import FileUnits
@@ -23,7 +24,7 @@ class UpdateHead:
     """
 
     survey: str
-    roofs_outside: tuple[dict[str, Any], ...] = ()
+    roofs_outside: tuple[Values, ...] = ()
 
 
 @dataclass(frozen=True)

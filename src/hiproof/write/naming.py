@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from pyproj import CRS
 
+from ..data_files import Values
 from ..frames import METRES, Units
 from ..model.installation import CHIMNEY, ROOF_OBJECT
 from ..read.crs import (
@@ -172,7 +173,7 @@ class FileUnits:
             )
         )
 
-    def describe(self) -> dict[str, Any]:
+    def describe(self) -> Values:
         """Return the units for the record of a run."""
         metres = {"metres_in_plan_unit": self.gml.plan, "metres_in_height_unit": self.gml.height}
         return {"coordinates": str(self.gml), "attributes": "metre", **metres}

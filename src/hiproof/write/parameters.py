@@ -19,6 +19,7 @@ import numpy as np
 import shapely
 
 from ..compose.settle import DIGITS, round_number
+from ..data_files import Values
 from ..model import Building, Model, Part
 from .attribute_list import TABLES
 from .fragments import Fragment, Sheet
@@ -63,7 +64,7 @@ class ParametersWriter(BuildingWriter):
 writer = ParametersWriter
 
 
-def head_record(head: FileHead) -> dict[str, Any]:
+def head_record(head: FileHead) -> Values:
     """Return the JSON object of the first line."""
     return {
         "hiproof_parameters": VERSION,
@@ -98,7 +99,7 @@ def parameters_line(building: Building) -> bytes:
     return dump(building_record(building)) + b"\n"
 
 
-def building_record(building: Building) -> dict[str, Any]:
+def building_record(building: Building) -> Values:
     """Return the JSON object of one building; see `write_parameters`."""
     quality, roof = building.quality, None if building.built is None else building.roof
     record = {
@@ -138,9 +139,9 @@ def building_record(building: Building) -> dict[str, Any]:
     return make_record("building", record)
 
 
-def list_further_values(model: Model) -> dict[str, Any]:
+def list_further_values(model: Model) -> Values:
     """Return what a building has beside its roof; nothing where it is as usual."""
-    values: dict[str, Any] = {}
+    values: Values = {}
     if model.installations:
         values["installations"] = [
             make_record(
@@ -174,7 +175,7 @@ def list_further_values(model: Model) -> dict[str, Any]:
     return values
 
 
-def part_record(part: Part) -> dict[str, Any]:
+def part_record(part: Part) -> Values:
     """Return a part of a building's object, as `hiproof build` reads it."""
     sigma = {
         ("rotation" if n == "kappa" else n): (math.degrees(s) if n == "kappa" else s)
@@ -193,7 +194,7 @@ def part_record(part: Part) -> dict[str, Any]:
     )
 
 
-def make_record(table: str, values: dict[str, Any]) -> dict[str, Any]:
+def make_record(table: str, values: Values) -> Values:
     """Return values as the object of a table, each written by its declared type."""
     return {
         name: WRITERS[type](values[name]) if type in WRITERS else values[name]

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..data_files import Values
 from ..errors import CompositionError
 from ..model import GROUND, Building, Face, Solid
 from ..model.roof_figures import RoofFigures, roof_figures
@@ -31,7 +32,7 @@ class PartShape:
     figures: RoofFigures
     block: Solid | None
     types: tuple[str, ...]
-    attributes: dict[str, Any]
+    attributes: Values
 
 
 @dataclass(frozen=True)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
 from ..compose.settle import round_number
+from ..data_files import Values
 from ..model import ROOF, Face, Part
 from ..model.roof_figures import FLAT_SLOPE_DEG, RoofFigures
 from ..primitives.catalogue import SMOOTH
@@ -59,11 +59,11 @@ def measure_angles(figures: RoofFigures, faces: Sequence[int]) -> tuple[float, f
 
 
 def join_values(
-    values: Mapping[int, Mapping[str, Any]], numbers: Sequence[int], figures: RoofFigures
-) -> dict[int, dict[str, Any]]:
+    values: Mapping[int, Values], numbers: Sequence[int], figures: RoofFigures
+) -> dict[int, Values]:
     """Return further values by surface, those of several faces summed or averaged by area."""
     groups = group_faces(numbers)
-    joined: dict[int, dict[str, Any]] = {}
+    joined: dict[int, Values] = {}
     for face, of_face in values.items():
         faces = [member for member in groups[numbers[face]] if member in values]
         if len(faces) == 1:

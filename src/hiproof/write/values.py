@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..compose.settle import PLAN_DIGITS, round_number
+from ..data_files import Values
 
 # as many characters as any coordinate takes: room in a head for what is known at the end
 WIDEST = -123456789.1234
@@ -121,7 +122,7 @@ def generic_attribute(name: str, value: Any) -> str:
     return f'<{tag} name="{xml_attribute(name)}"><gen:value>{text}</gen:value></{tag}>'
 
 
-def format_attribute_set(name: str, values: dict[str, Any]) -> str:
+def format_attribute_set(name: str, values: Values) -> str:
     """Return a gen:genericAttributeSet of `values` by name."""
     inside = "".join(generic_attribute(key, value) for key, value in values.items())
     return (

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import Any
 
 import numpy as np
 
 from ...compose.settle import round_number
+from ...data_files import Values
 from ...frames import Units
 from ...model import CEILING, GROUND, ROOF, WALL, Face, Part, Solid
 from ...model.roof_figures import RoofFigures
@@ -88,7 +88,7 @@ def boundary_surfaces(
     figures: RoofFigures,
     polygon_ids: list[str],
     rings: list[str],
-    attributes: dict[int, dict[str, Any]],
+    attributes: dict[int, Values],
 ) -> list[str]:
     """Return the RoofSurfaces, WallSurfaces and GroundSurfaces of a solid.
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 import shapely
 
 from ...compose.settle import round_number
+from ...data_files import Values
 from ...frames import METRES, Units
 from ...model import GROUND, ROOF, Building, Face, Solid
 from ...model.roof_figures import RoofFigures
@@ -41,7 +41,7 @@ class Vertices:
         return [self.numbers.setdefault(tuple(p), len(self.numbers)) for p in grid.tolist()]
 
 
-def building_geometry(sheet: Sheet, vertices: Vertices) -> list[dict[str, Any]]:
+def building_geometry(sheet: Sheet, vertices: Vertices) -> list[Values]:
     """Return the geometry of the building itself, as far as it is asked for.
 
     The footprint comes always, then roof edge, blocks, and solid. Vertices go to `vertices`. A
@@ -69,7 +69,7 @@ def building_geometry(sheet: Sheet, vertices: Vertices) -> list[dict[str, Any]]:
     ]
 
 
-def part_geometry(sheet: Sheet, part: PartShape, vertices: Vertices) -> list[dict[str, Any]]:
+def part_geometry(sheet: Sheet, part: PartShape, vertices: Vertices) -> list[Values]:
     """Return block and solid of a building part, as far as they are asked for."""
     geometry = [] if part.block is None else [solid_geometry(part.block, vertices, "1.3")]
     if LOD_SOLID in sheet.head.write.lods:
@@ -78,7 +78,7 @@ def part_geometry(sheet: Sheet, part: PartShape, vertices: Vertices) -> list[dic
     return geometry
 
 
-def level_surfaces(building: Building, shapes: Shapes, vertices: Vertices) -> list[dict[str, Any]]:
+def level_surfaces(building: Building, shapes: Shapes, vertices: Vertices) -> list[Values]:
     """Return LoD0, told apart by semantics: the unmoved footprint and the roof's edge."""
     solid = building.model.on_one_level
     corners, grounds = solid.vertices, solid.select_faces(GROUND)
@@ -99,11 +99,11 @@ def ground_boundaries(
     return [[vertices.add(corners[list(ring)])[::-1] for ring in face.rings] for face in grounds]
 
 
-def multi_surface(boundaries: list) -> dict[str, Any]:
+def multi_surface(boundaries: list) -> Values:
     return {"type": "MultiSurface", "lod": LOD_FOOTPRINT, "boundaries": boundaries}
 
 
-def named_surfaces(surface: dict[str, Any], kind: str) -> dict[str, Any]:
+def named_surfaces(surface: Values, kind: str) -> Values:
     return {
         **surface,
         "semantics": {"surfaces": [{"type": kind}], "values": [0] * len(surface["boundaries"])},
@@ -114,16 +114,16 @@ def solid_geometry(
     solid: Solid,
     vertices: Vertices,
     lod: str,
-    described: Mapping[int, dict[str, Any]] = MappingProxyType({}),
+    described: Mapping[int, Values] = MappingProxyType({}),
     numbers: Sequence[int] | None = None,
-) -> dict[str, Any]:
+) -> Values:
     """Return the Solid with its semantics.
 
     A surface in `described` is a semantic surface of its own; all other faces of a kind share one.
     `numbers` are those of the faces' surfaces.
     """
     vertex_numbers = vertices.add(solid.vertices)
-    surfaces: dict[int | str, dict[str, Any]] = {}
+    surfaces: dict[int | str, Values] = {}
     keys = []
     for number, face in zip(numbers or range(len(solid.faces)), solid.faces, strict=True):
         keys.append(number if number in described else face.kind)
@@ -142,8 +142,8 @@ def describe_solid(
     figures: RoofFigures,
     vertices: Vertices,
     lod: str,
-    attributes: Mapping[int, dict[str, Any]],
-) -> dict[str, Any]:
+    attributes: Mapping[int, Values],
+) -> Values:
     """Return a solid, the building's or a part's, whose roof surfaces have semantics of their own.
 
     They are slope, azimuth (degrees), and the roof part to which a surface belongs. `attributes`
@@ -151,7 +151,7 @@ def describe_solid(
     """
     parts, prefix = sheet.building.parts, sheet.head.prefix
     numbers = number_surfaces(solid.faces, parts)
-    described: dict[int, dict[str, Any]] = {}
+    described: dict[int, Values] = {}
     for number, faces in group_faces(numbers).items():
         face = solid.faces[number]
         if face.kind != ROOF:

@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from ...data_files import Values
 from ...model import Building
 from ...settings import WriteSettings
 from ..building_attributes import OWN, PREFIX
@@ -111,7 +112,7 @@ class CityJSONWriter(BuildingWriter):
         else:
             self.file.write(fragment.text)
 
-    def add_to_document(self, feature: dict[str, Any]) -> None:
+    def add_to_document(self, feature: Values) -> None:
         for name, city_object in feature["CityObjects"].items():
             for geometry in city_object.get("geometry", ()):
                 geometry["boundaries"] = shift_indices(geometry["boundaries"], self.vertex_count)
@@ -143,7 +144,7 @@ class CityJSONWriter(BuildingWriter):
 
     def header(self, translate: np.ndarray, extent: list[float] | None) -> bytes:
         """Return the first line; of a document, all before the first object."""
-        metadata: dict[str, Any] = {}
+        metadata: Values = {}
         if extent is not None:
             metadata["geographicalExtent"] = extent
         if self.reference_system is not None:
@@ -163,7 +164,7 @@ def choose_offset(corner_xy: np.ndarray) -> np.ndarray:
     return np.append(np.floor(np.asarray(corner_xy) / GRID) * GRID, 0.0)
 
 
-def city_objects(sheet: Sheet, vertices: Vertices) -> dict[str, dict[str, Any]]:
+def city_objects(sheet: Sheet, vertices: Vertices) -> dict[str, Values]:
     """Return CityObjects, building and parts, by id; their vertices go to `vertices`."""
     geometry, children = building_geometry(sheet, vertices), {}
     for k, part in enumerate(sheet.shapes.parts, 1):
@@ -182,9 +183,7 @@ def city_objects(sheet: Sheet, vertices: Vertices) -> dict[str, dict[str, Any]]:
     return {sheet.name: whole, **children}
 
 
-def child(
-    sheet: Sheet, kind: str, attributes: dict[str, Any], geometry: list[dict[str, Any]]
-) -> dict[str, Any]:
+def child(sheet: Sheet, kind: str, attributes: Values, geometry: list[Values]) -> Values:
     """Return a CityObject that belongs to the building."""
     return {"type": kind, "parents": [sheet.name], "attributes": attributes, "geometry": geometry}
 

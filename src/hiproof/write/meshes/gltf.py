@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from ...data_files import Values
 from ...model import Face
 from ..colours import linear_rgb
 from .triangles import face_normals, faces_triangles
@@ -32,7 +33,7 @@ class GlbDocument:
 
     def __init__(self) -> None:
         asset = {"version": "2.0", "generator": "hiproof"}
-        self.tables: dict[str, Any] = {"asset": asset, "scene": 0, "scenes": [{}]}
+        self.tables: Values = {"asset": asset, "scene": 0, "scenes": [{}]}
         self.chunks: list[bytes] = []
         self.size = 0
 
@@ -87,8 +88,8 @@ def write_models(path: Path, buildings: Iterable[ViewedModel], crs: str | None =
     from ..files import atomic_file
 
     document, origin = GlbDocument(), np.zeros(3)
-    nodes: list[dict[str, Any]] = []
-    meshes: list[dict[str, Any]] = []
+    nodes: list[Values] = []
+    meshes: list[Values] = []
     materials: dict[Look, int] = {}
     for model in buildings:
         origin = origin if nodes else model.corner
@@ -112,7 +113,7 @@ def write_models(path: Path, buildings: Iterable[ViewedModel], crs: str | None =
 
 def add_primitives(
     document: GlbDocument, model: ViewedModel, origin: np.ndarray, materials: dict[Look, int]
-) -> list[dict[str, Any]]:
+) -> list[Values]:
     """Add a building to a document: primitives of roofs by type, walls and ground."""
     primitives = []
     for look, faces in model.faces_by_look().items():
@@ -124,7 +125,7 @@ def add_primitives(
     return primitives
 
 
-def material_table(look: Look) -> dict[str, Any]:
+def material_table(look: Look) -> Values:
     surface = {
         "baseColorFactor": [*linear_rgb(look.colour), 1.0],
         "metallicFactor": 0.0,

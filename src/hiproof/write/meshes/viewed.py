@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
+from ...data_files import Values
 from ...frames import Units
 from ...model import CEILING, GROUND, ROOF, WALL, Building, Face, Solid
 from ..colours import GROUND_COLOUR, WALL_COLOUR, type_colour, type_colours
@@ -31,7 +32,7 @@ class ViewedModel(NamedTuple):
     id: str
     roof_type: str
     solid: Solid
-    attributes: dict[str, Any]
+    attributes: Values
     part_types: Mapping[int, str]
 
     @property
@@ -40,7 +41,7 @@ class ViewedModel(NamedTuple):
         return np.floor(self.solid.vertices.min(axis=0))
 
     @property
-    def values(self) -> dict[str, Any]:
+    def values(self) -> Values:
         """Its id, its roof type and its attributes, by name."""
         return merge_values({"id": self.id, "roof_type": self.roof_type}, self.attributes)
 
@@ -90,7 +91,7 @@ def parameters_text(building: Building) -> str:
     return json.dumps({"origin": origin, "parts": parts}, separators=(",", ":"))
 
 
-def merge_values(members: dict[str, Any], attributes: dict[str, Any]) -> dict[str, Any]:
+def merge_values(members: Values, attributes: Values) -> Values:
     """Return `members` values by name, then the `attributes`.
 
     An attribute that has such a name and another value is called NAME_input.

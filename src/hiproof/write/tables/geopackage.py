@@ -12,6 +12,7 @@ from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from typing import Any
 
+from ...data_files import Values
 from ...model import Building
 from ..attribute_list import PREFIX, TABLES
 from ..files import atomic, scratch
@@ -31,9 +32,9 @@ from .vector_layer import (
 )
 
 BUILDINGS = "buildings"
-OUTLINE_GEOMETRY: dict[str, Any] = {"geometry_type": "MultiPolygon", "promote_to_multi": True}
+OUTLINE_GEOMETRY: Values = {"geometry_type": "MultiPolygon", "promote_to_multi": True}
 # Tables and the geometry of their rows, in pyogrio's terms.
-TABLE_GEOMETRIES: dict[str, dict[str, Any]] = {
+TABLE_GEOMETRIES: dict[str, Values] = {
     BUILDINGS: OUTLINE_GEOMETRY,
     "parts": OUTLINE_GEOMETRY,
     "roof_surfaces": {"geometry_type": "Polygon Z"},

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import shapely
 
 from ...compose.settle import round_number
+from ...data_files import Values
 from ...errors import OutputError
 from ...frames import METRES, Units
 from ...geometry.flat_shell import FlatShell
@@ -20,7 +21,7 @@ from ..fragments import Sheet
 from ..surfaces import number_surfaces
 from ..values import metres, plain_text
 
-Row = tuple[bytes | None, dict[str, Any]]  # the geometry as WKB, the values by column
+Row = tuple[bytes | None, Values]  # the geometry as WKB, the values by column
 
 
 class Rows(NamedTuple):
@@ -71,7 +72,7 @@ def table_rows(sheet: Sheet) -> Rows:
     )
 
 
-def building_row(building: Building, attributes: dict[str, Any], units: Units) -> Row:
+def building_row(building: Building, attributes: Values, units: Units) -> Row:
     """Return the outline in `units`, None if unknown, and attributes by column."""
     outline = building.footprint if building.built is None else building.roof.world_outline
     names = {
@@ -96,7 +97,7 @@ def surface_rows(
     building: Building,
     figures: RoofFigures | None,
     units: Units,
-    attributes: dict[int, dict[str, Any]],
+    attributes: dict[int, Values],
 ) -> tuple[Row, ...]:
     """Return a row a roof face: polygon, slope, azimuth, area, part and its `attributes`.
 

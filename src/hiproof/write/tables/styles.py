@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
+from ...data_files import Values
 from ...primitives.catalogue import CATALOGUE
 from ..attribute_list import OWN
 from ..colours import GRADE_COLOURS, ROOF_COLOURS, SUN_STOPS, UNKNOWN_COLOUR, list_legend
@@ -83,7 +84,7 @@ def choose_styles(columns: Mapping[str, Collection[str]], sky: str = "") -> tupl
     return (*others, sun)
 
 
-def style_rows(styles: Sequence[Style] = STYLES) -> list[dict[str, Any]]:
+def style_rows(styles: Sequence[Style] = STYLES) -> list[Values]:
     """Return the rows of `layer_styles`: by roof type (default) and by quality of models."""
     return [
         {

@@ -15,6 +15,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
+from ...data_files import Values
 from ...errors import OutputError
 from ..attribute_list import OWN, TABLES
 
@@ -24,7 +25,7 @@ CONFIGURATION = {
     "OGR_GPKG_ALLOW_THREADED_RTREE": False,
     "OGR_SQLITE_SYNCHRONOUS": "OFF",  # the file is seen once it is whole
 }
-GEOPACKAGE: dict[str, Any] = {
+GEOPACKAGE: Values = {
     "driver": "GPKG",
     "dataset_options": {"VERSION": "1.2"},
     "layer_options": {"GEOMETRY_NAME": "geom"},

@@ -15,6 +15,7 @@ from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 
+from ....data_files import Values
 from ...attribute_list import TABLES
 from ...colours import linear_rgb
 from ...naming import UniqueNames
@@ -52,7 +53,7 @@ class Found:
     def __init__(self) -> None:
         self.are_numbers: dict[str, bool | None] = {}  # None of what had no value so far
 
-    def add(self, values: dict[str, Any]) -> None:
+    def add(self, values: Values) -> None:
         for name, value in values.items():
             was_number = self.are_numbers.setdefault(name, None)
             if value is not None:
@@ -77,9 +78,9 @@ def property_id(names: UniqueNames, name: str) -> str:
     return names.take(plain if re.match("[A-Za-z_]", plain) else f"_{plain}").replace("..", "_")
 
 
-def make_schema(properties: Iterable[Property]) -> dict[str, Any]:
+def make_schema(properties: Iterable[Property]) -> Values:
     """Return the schema: one class, a property a column."""
-    kinds: dict[bool, dict[str, Any]] = {
+    kinds: dict[bool, Values] = {
         True: {"type": "SCALAR", "componentType": "FLOAT64", "noData": NO_NUMBER},
         False: {"type": "STRING", "noData": ""},
     }
@@ -92,14 +93,14 @@ def make_schema(properties: Iterable[Property]) -> dict[str, Any]:
 
 
 def add_table(
-    document: GlbDocument, properties: Sequence[Property], rows: Sequence[dict[str, Any]]
-) -> dict[str, Any]:
+    document: GlbDocument, properties: Sequence[Property], rows: Sequence[Values]
+) -> Values:
     """Add the table of `rows`, values by attribute's name."""
     columns = {p.id: add_column(document, p, [row.get(p.name) for row in rows]) for p in properties}
     return {"name": "buildings", "class": CLASS, "count": len(rows), "properties": columns}
 
 
-def add_column(document: GlbDocument, column: Property, values: list[Any]) -> dict[str, Any]:
+def add_column(document: GlbDocument, column: Property, values: list[Any]) -> Values:
     if column.is_number:
         numbers = np.array([NO_NUMBER if v is None else v for v in values], "<f8")
         return {"values": document.view(numbers.tobytes())}
@@ -128,7 +129,7 @@ PAINTED = {
 
 
 def tile_glb(
-    meshes: Sequence[TileMesh], rows: Sequence[dict[str, Any]], properties: Sequence[Property]
+    meshes: Sequence[TileMesh], rows: Sequence[Values], properties: Sequence[Property]
 ) -> bytes:
     """Return the file of the buildings `meshes`.
 
@@ -152,9 +153,7 @@ def tile_glb(
     return document.to_bytes()
 
 
-def primitive(
-    document: GlbDocument, meshes: Sequence[TileMesh], corners: np.ndarray
-) -> dict[str, Any]:
+def primitive(document: GlbDocument, meshes: Sequence[TileMesh], corners: np.ndarray) -> Values:
     """Return all triangles as one primitive, shared corners of a face written once."""
     ids = np.repeat(np.arange(len(meshes)), [len(mesh.corners) for mesh in meshes])
     corner_table = np.zeros(

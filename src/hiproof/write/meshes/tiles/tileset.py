@@ -18,6 +18,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from .... import __version__
+from ....data_files import Values
 from ....errors import InputError, InputWarning, OutputError
 from ...files import output_error, scratch, whole_folder
 from ..viewed import ViewedModel, merge_values
@@ -108,7 +109,7 @@ class WaitingCity:
         places = world if self.globe is None else self.globe.to_earth(world)
         return (places - self.transform[:3, 3]) @ self.transform[:3, :3]
 
-    def at(self, index: int) -> tuple[dict[str, Any], TileMesh]:
+    def at(self, index: int) -> tuple[Values, TileMesh]:
         """Return the row and the mesh of a building that was added."""
         self.file.seek(self.offsets[index])
         return json.loads(self.file.readline()), TileMesh.load(self.file)
@@ -124,7 +125,7 @@ class TileFiles:
         self.properties = city.found.properties()
         (folder / "tiles").mkdir()
 
-    def tileset(self, tree: Tile) -> dict[str, Any]:
+    def tileset(self, tree: Tile) -> Values:
         """Write the files of all tiles, and return the content of tileset.json."""
         globe, transform, root = self.city.globe, self.city.transform, self.write_tile(tree)
         if globe is None:
@@ -143,10 +144,10 @@ class TileFiles:
             "root": root,
         }
 
-    def write_tile(self, tile: Tile) -> dict[str, Any]:
+    def write_tile(self, tile: Tile) -> Values:
         """Write a tile and all below, and return it as the tileset names it."""
         below = tile.list_below()
-        description: dict[str, Any] = {
+        description: Values = {
             "boundingVolume": bound_boxes(self.boxes[np.append(tile.items, below)]),
             "geometricError": MISSED * float(self.sizes[below].max(initial=0.0)),
             "refine": "ADD",
