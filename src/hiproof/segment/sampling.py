@@ -203,9 +203,7 @@ def thin_to_cells(xyz, lower, cell, chunk):
     selection = []
     for start in range(0, len(xyz), chunk):
         steps = np.floor((xyz[start : start + chunk] - lower) / cell).astype(np.int64)
-        keys, first = np.unique(
-            (steps[:, 0] << 42) + (steps[:, 1] << 21) + steps[:, 2], return_index=True
-        )
+        keys, first = np.unique(steps @ (1 << 42, 1 << 21, 1), return_index=True)
         new = ~np.isin(keys, visited, assume_unique=True)
         visited = np.union1d(visited, keys[new])
         selection.append(start + first[new])

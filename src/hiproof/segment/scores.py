@@ -35,12 +35,8 @@ class Scores:
     @property
     def recalls(self) -> dict[str, float]:
         """Share of each true class told rightly, of those that occur."""
-        truths = self.confusion.sum(axis=1)
-        return {
-            name: float(self.confusion[i, i] / truths[i])
-            for i, name in enumerate(self.names)
-            if truths[i]
-        }
+        counts = zip(self.names, np.diag(self.confusion), self.confusion.sum(axis=1), strict=True)
+        return {name: float(right / total) for name, right, total in counts if total}
 
     @property
     def balanced_accuracy(self) -> float:
