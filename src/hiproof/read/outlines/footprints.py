@@ -229,7 +229,7 @@ def transform_geometries(
         return shapely.transform(geometries, lambda xy: xy * compare_units(source, target))
     transformer = make_transformer(source, target)
     warn_if_coarse(find_operation(str(path), source, target, find_middle(geometries)))
-    moved = shapely.transform(geometries, lambda xy: np.column_stack(transformer.transform(*xy.T)))
+    moved = shapely.transform(geometries, transformer.transform, interleaved=False)
     if not np.isfinite(shapely.get_coordinates(moved)).any():
         advice = "check which CRS each file names"
         if source.is_geographic:

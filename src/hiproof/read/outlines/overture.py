@@ -170,8 +170,8 @@ def read_overture(
 def find_collection(catalogue: str, kind: str) -> tuple[str, Document]:
     """Return the latest release a catalogue names, or itself, and its collection of a type."""
     document = read_document(catalogue)
-    if THEME not in document.children():
-        releases = document.children()
+    releases = document.children()
+    if THEME not in releases:
         latest = document.content.get("latest") or max(releases, default="")
         document = find_child(document, str(latest))
     release = document.content.get("release:version") or document.content.get("id")
