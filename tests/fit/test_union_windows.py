@@ -10,6 +10,8 @@ from hiproof.fit.layout.blocks import BLOCK_M2, HeightRaster, find_cheapest_cut,
 from hiproof.fit.layout.plan import lay_out_plan
 from hiproof.fit.layout.whole import lay_out_whole
 from hiproof.fit.roof import fit_building
+from hiproof.fit.roof.draft import Draft
+from hiproof.fit.roof.tables import VOLUME_COUNT
 from hiproof.settings import Settings
 from hiproof.status import Status
 from points_of_roofs import sample_heights
@@ -83,6 +85,21 @@ def test_a_large_roof_is_a_valid_solid():
     model = reconstruct(sample_heights(compute_hall, HALL, 3.0, 0.02), HALL)
     assert model.status is Status.MODELLED
     assert not check_solid(model.built.solid)
+
+
+def test_moves_make_no_one_roof_of_too_many_volumes(monkeypatch):
+    """Moves over a whole town as one footprint held a run for a quarter of an hour."""
+    improved, improve = [], Draft.improve
+
+    def count_and_improve(draft, *arguments):
+        improved.append(draft.roof.counts[VOLUME_COUNT])
+        improve(draft, *arguments)
+
+    monkeypatch.setattr(Draft, "improve", count_and_improve)
+    monkeypatch.setattr("hiproof.fit.roof.grow.MOST_JOINED", 6)
+    model = reconstruct(sample_heights(compute_hall, HALL, 3.0, 0.02), HALL)
+    assert max(improved) < 7 <= len(model.parts)
+    assert model.status is Status.MODELLED and not check_solid(model.built.solid)
 
 
 def test_edges_of_a_long_roof_stay_where_its_steps_are():

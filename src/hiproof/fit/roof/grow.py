@@ -23,6 +23,9 @@ from .tables import VOLUME_COUNT, pack
 # Points in which structure is sought, of a house and of a larger roof or block.
 HOUSE_POINTS, BLOCK_POINTS = 600, 1600
 LARGEST_HOUSE_M2 = 200.0  # Area (m2) of the largest house.
+# Most volumes that moves make one roof of. Time grows with their cube, and footprints with more,
+# such as a whole town's, are no building: 220 volumes take a minute, 500 a quarter of an hour.
+MOST_JOINED = 250
 
 
 def find_roof(whole: Whole, keeps_shapes: bool) -> Draft:
@@ -34,6 +37,8 @@ def find_roof(whole: Whole, keeps_shapes: bool) -> Draft:
         draft = make_draft(roof, make_site(whole, keeps_shapes))
     # Narrow strips cost from now on what they are seen to lack.
     draft.fit()
+    if draft.roof.counts[VOLUME_COUNT] > MOST_JOINED:
+        return draw_in_all(draft)
     draft.improve()
     if whole.plan.uvz.shape[1] > count_search_points(whole.outline.area):  # else all were seen
         added = add_at_places(draft, whole, BLOCK_POINTS)
