@@ -10,7 +10,7 @@ import shapely
 from hiproof.fit.candidates.volumes import COLUMNS, LEVEL, N_PLANES, OFFSET0, U0, V1
 from hiproof.fit.roof import fit_building
 from hiproof.fit.roof.site import make_site
-from hiproof.fit.roof.start import add_volume, put_on_walls
+from hiproof.fit.roof.start import add_volume
 from hiproof.fit.roof.tables import make_tables
 from hiproof.fit.shapes.curved import fit_shapes
 from hiproof.fit.shapes.regions import unite_outlines
@@ -46,7 +46,7 @@ def test_a_side_lies_on_a_wall_near_it_unless_points_lie_elsewhere(end, drawn_en
     roof = make_tables(2, 20, 20)
     for rectangle, height in ([-7.0, 7.0, -4.0, 4.0], -5.0), ([-4.0, drawn_end, -4.0, 4.0], 2.0):
         volume[U0 : V1 + 1], volume[OFFSET0 + LEVEL] = rectangle, height
-        put_on_walls(roof, add_volume(roof, volume, whole.turn), site, False)
+        add_volume(roof, volume, whole.turn, site, False)
     ends = -roof.half_planes[1, :2, 2] * roof.half_planes[1, :2, 0]
     assert ends == pytest.approx([-4.0, place], abs=1e-9)
 

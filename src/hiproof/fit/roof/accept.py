@@ -15,6 +15,7 @@ from .draw import is_near, widen_box
 from .moves import (
     ALL_MOVES,
     MOVE_COLUMNS,
+    NEW_MOVES,
     NO_MOVES,
     SHARE,
     SHARES_ONLY,
@@ -23,14 +24,16 @@ from .moves import (
     list_moves,
 )
 from .price import (
+    Known,
+    compare_extents,
     count_known_units,
     fit_unknowns,
     know_change,
+    list_extents,
     list_points,
     list_unknowns,
     list_view,
     price_drawing,
-    price_extents,
     price_misfit,
     price_tables,
     widen,
@@ -103,10 +106,10 @@ def try_move(roof, trial, move, site, drawing, known, changed, room, exact):
     view, points = list_view(trial, boxes), list_points(site, boxes)
     if len(view) == 0:
         return 0.0, boxes
-    units, weight = known.units[0], 1.0
+    units, weight = known.units, 1.0
     for box in boxes:
         units += count_known_units(known, widen(box, BESIDE_M))
-    units += price_extents(roof, trial, site) - price_extents(trial, roof, site)
+    units += compare_extents(roof, trial, known.extents, site)
     if len(points) > FIRST_JUDGES and not exact and move[0] != SHARE and move[0] != TO_POINTS:
         step = 1 + (len(points) - 1) // FIRST_JUDGES
         weight, points = len(points) / len(points[::step]), points[::step].copy()
@@ -171,6 +174,8 @@ def make_moves(roof, trial, site, drawing, known, questions, touched):
     changed, room = np.zeros(len(roof.sides), np.bool_), np.empty((len(roof.sides), 4))
     moves, gains = np.empty((MOST_MOVES, MOVE_COLUMNS), np.int64), np.empty(MOST_MOVES)
     count, least = list_moves(roof, site, questions, moves), LEAST_UNITS * site.unit
+    extents = list_extents(roof, site)  # volumes may have other numbers now
+    known = Known(known.costs, known.corners, known.steps, known.units, extents)
     for m in range(count):
         gains[m], _ = try_move(roof, trial, moves[m], site, drawing, known, changed, room, False)
     touched[:] = NO_MOVES
@@ -225,7 +230,7 @@ def add_new(roof, new, site, drawing, known, k):
 def improve_new(roof, trial, site, drawing, known, k):
     """Make the moves of volume k once. Returns what is then known."""
     questions = np.full(len(roof.sides), NO_MOVES)
-    questions[k] = ALL_MOVES
+    questions[k] = NEW_MOVES
     known = make_moves(roof, trial, site, drawing, known, questions, np.zeros_like(questions))
     pack(roof)
     return known

@@ -21,7 +21,7 @@ from .copies import add_copy, list_copies
 from .draft import Draft
 from .draw import compute_heights
 from .price import OVER_M, Site
-from .start import add_volume, put_on_walls
+from .start import add_volume
 from .tables import VOLUME_COUNT, Tables
 
 UNEXPLAINED = 0.98  # Share of the highest misfit from which on a point counts as unexplained.
@@ -75,10 +75,15 @@ def list_places(roof: Tables, site: Site) -> Iterator[Box]:
 
 def add_all(draft: Draft, scene: Scene, box: Box) -> Draft:
     """Add volumes in a window as long as one saves. Returns the roof with them."""
+    return [draft, *add_each(draft, scene, box)][-1]
+
+
+def add_each(draft: Draft, scene: Scene, box: Box) -> Iterator[Draft]:
+    """Yield the roof after each volume that is added in a window, as long as one saves."""
     better = add_best(draft, scene, box)
     while better is not None:
-        draft, better = better, add_best(better, scene, box)
-    return draft
+        yield better
+        better = add_best(better, scene, box)
 
 
 def add_best(draft: Draft, scene: Scene, box: Box) -> Draft | None:
@@ -105,9 +110,7 @@ def list_additions(draft: Draft, scene: Scene, box: Box) -> Iterator[tuple[Draft
         yield new, add_copy(new.roof, int(source), x, y)
     for volume in list_volumes(draft.roof, scene):
         new = draft.copy()
-        k = add_volume(new.roof, volume, scene.turn)
-        put_on_walls(new.roof, k, site, True)
-        yield new, k
+        yield new, add_volume(new.roof, volume, scene.turn, site, True)
 
 
 def list_volumes(roof: Tables, scene: Scene) -> Iterator[np.ndarray]:

@@ -9,7 +9,7 @@ import numpy as np
 from .accept import FIT_ROUNDS, LEAST_UNITS, LOOP_ROUNDS, fit_roof, improve
 from .draw import Drawing, make_drawing
 from .price import Known, Site, know, price_known
-from .tables import Tables, copy_tables, make_tables_like
+from .tables import Tables, make_tables_like
 
 
 @dataclass
@@ -34,8 +34,7 @@ class Draft:
 
     def copy(self) -> Draft:
         """Return a draft of the same roof, to be changed."""
-        roof = make_tables_like(self.roof)
-        copy_tables(self.roof, roof)
+        roof = Tables(*(column.copy() for column in self.roof))
         return replace(self, roof=roof, known=self.known._replace(costs=self.known.costs.copy()))
 
     def fit(self) -> None:

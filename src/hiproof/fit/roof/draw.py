@@ -30,6 +30,7 @@ HIDDEN_M = 0.01  # A side reaches no further (m) below what hides it.
 RING_CORNERS = 40  # Most corners of a fragment.
 MOST_FRAGMENTS = 4000  # Most fragments of what is drawn at once.
 PIECE_ROOM = 200  # Most fragments of one plane in one piece of the outline.
+AROUND_M = 0.5  # What is drawn around a box (m): what lies in it is then as in the whole roof.
 ON_LINE_M = 1e-9  # Distance (m) from a line of a place on it.
 FRAGMENT_M2 = 1e-4  # Area (m2) of the smallest fragment.
 ONE_PLACE_M = 0.01  # Corners nearer than this (m) are one.
@@ -295,8 +296,18 @@ def cut_part(roof, k, site, part, plan, room):
 
 
 @compiled
+def cut_box(ring, size, box, room):
+    """Keep of a convex ring what lies in a box, and around it as far as a stretch of a step."""
+    for side in range(4):
+        sign = 1.0 if side % 2 == 0 else -1.0
+        a, b = (sign, 0.0) if side < 2 else (0.0, sign)
+        size = cut(ring, size, a, b, AROUND_M - sign * box[side], room) if size > 0 else 0
+    return size
+
+
+@compiled
 def draw(roof, drawing, view, site, box):
-    """Draw the volumes of `view` (m,) in the parts of the outline that reach into a `box` (4,)."""
+    """Draw the volumes of `view` (m,) inside the outline, in a `box` (4,) and close around it."""
     drawing.count[0] = 0
     number_planes(roof, view, drawing.numbers)
     plan, room = drawing.scratch[0], drawing.scratch[4]
@@ -309,6 +320,7 @@ def draw(roof, drawing, view, site, box):
             if not meets(roof.boxes[j], bounds[0], bounds[1], bounds[2], bounds[3]):
                 continue
             size = cut_part(roof, j, site, part, plan, room)
+            size = cut_box(plan, size, box, room)
             if size == 0 or measure_area(plan, size) < FRAGMENT_M2:
                 continue
             for p in range(roof.n_planes[j]):
@@ -420,8 +432,9 @@ def list_corners(roof, drawing, box):
     """Return the places (n, 2) of a drawn roof's corners in a `box` (4,), one for each level."""
     xs, ys = list_places(drawing, box)
     out, total, levels = np.empty((len(xs), 2)), 0, np.empty(MOST_AT_PLACE)
+    room = np.empty(MOST_AT_PLACE, np.int64), np.empty(MOST_AT_PLACE), np.empty(MOST_AT_PLACE)
     for i in range(len(xs)):
-        count = find_levels(roof, drawing, xs[i], ys[i], levels)
+        count = find_levels(roof, drawing, xs[i], ys[i], levels, room)
         while total + count > len(out):
             out = np.concatenate((out, np.empty_like(out)))
         out[total : total + count, 0], out[total : total + count, 1] = xs[i], ys[i]
@@ -430,10 +443,13 @@ def list_corners(roof, drawing, box):
 
 
 @compiled
-def find_levels(roof, drawing, x, y, levels):
-    """Set the heights of the corners at a place of a drawn roof. Returns their number."""
-    planes, covers = np.empty(MOST_AT_PLACE, np.int64), np.empty(MOST_AT_PLACE)
-    heights, met, count = np.empty(MOST_AT_PLACE), 0, 0
+def find_levels(roof, drawing, x, y, levels, room):
+    """Set the heights of the corners at a place of a drawn roof. Returns their number.
+
+    There is `room` for the planes that meet there, the angles that they cover, and their heights.
+    """
+    planes, covers, heights = room
+    met, count = 0, 0
     for f in range(drawing.count[0]):
         if not (
             drawing.boxes[f, 0] <= x <= drawing.boxes[f, 1]

@@ -12,7 +12,7 @@ from ..layout.blocks import split_into_blocks
 from ..layout.scene import Scene, open_window
 from ..layout.whole import Whole
 from .accept import BESIDE_M, CHANGE_MARGIN_M, HOPE_UNITS
-from .add import add_all, add_at_places
+from .add import add_all, add_at_places, add_each
 from .draft import Draft, make_draft
 from .draw import draw_in, draw_whole_roof
 from .price import know_change, widen
@@ -78,12 +78,15 @@ def grow(whole: Whole, keeps_shapes: bool) -> Draft:
 
 def regrow(draft: Draft, k: int, scene: Scene, whole: Whole) -> Draft:
     """Take out volume k, and add what is then missing. Returns the cheaper roof."""
-    new, boxes = draft.copy(), widen(draft.roof.boxes[k], CHANGE_MARGIN_M).reshape(1, 4)
-    new.roof.n_planes[k] = 0
-    new.known = know_change(new.roof, new.drawing, new.site, boxes, BESIDE_M, new.known)
-    pack(new.roof)
-    n_left = new.roof.counts[VOLUME_COUNT]
-    new = add_all(new, scene, whole.box)
+    new = rest = draft.copy()
+    boxes = widen(rest.roof.boxes[k], CHANGE_MARGIN_M).reshape(1, 4)
+    rest.roof.n_planes[k] = 0
+    rest.known = know_change(rest.roof, rest.drawing, rest.site, boxes, BESIDE_M, rest.known)
+    pack(rest.roof)
+    n_left = rest.roof.counts[VOLUME_COUNT]
+    for new in add_each(rest, scene, whole.box):
+        if abs(new.price - draft.price) < draft.least_gain:  # the same roof again
+            return draft
     if new.price < draft.price + HOPE_UNITS * draft.site.unit:
         new.improve(np.arange(len(new.roof.sides)) >= n_left)
     return new if new.price < draft.price - draft.least_gain else draft

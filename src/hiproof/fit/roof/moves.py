@@ -59,7 +59,7 @@ from .tables import (
 ) = range(21)
 MOVE_COLUMNS = 5  # Numbers of a move: its kind and four more.
 # What to try of a volume. One whose unknowns are shared is where it was.
-NO_MOVES, SHARES_ONLY, ALL_MOVES = range(3)
+NO_MOVES, SHARES_ONLY, NEW_MOVES, ALL_MOVES = range(4)
 # Planes face square to their sides, along the axis between two sides, or square to either.
 FACE_SIDES, FACE_AXIS, FACE_FIRST, FACE_SECOND = 1, 2, 3, 4
 
@@ -95,10 +95,10 @@ def list_moves(roof, site, asked, moves):
     """Write the moves that are `asked` (v,) of volumes to `moves`. Returns their number."""
     count = 0
     for k in range(roof.counts[VOLUME_COUNT]):
-        if asked[k] < ALL_MOVES or roof.n_planes[k] == 0:
+        if asked[k] < NEW_MOVES or roof.n_planes[k] == 0:
             continue
         box = roof.boxes[k]
-        for reach in range(2):
+        for reach in range(2 if asked[k] == ALL_MOVES else 0):
             count = write_move(moves, count, LEAVE_OUT, k, reach, 0, 0)
         for p in range(roof.n_planes[k]):
             if roof.n_planes[k] > 1 and not site.keeps_shapes:

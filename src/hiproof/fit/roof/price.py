@@ -59,11 +59,11 @@ Site = namedtuple(
 - keeps_shapes: whether volumes keep their planes, because not all types may be built.
 """
 
-Known = namedtuple("Known", "costs corners steps units")
+Known = namedtuple("Known", "costs corners steps units extents")
 """What is known of a roof as it is.
 
 What each point and cell costs (n + g,), where its corners (c, 2) are, its steps (s, 3) with the
-units of each, and the units (2,) of its tables and of how far its volumes extend.
+units of each, the units of its tables, and those of how far each volume extends (v,).
 """
 
 
@@ -200,18 +200,25 @@ def widen(box, reach):
 
 
 @compiled
-def price_extents(roof, other, site):
-    """Return the units of how far a roof's volumes extend, but those with sides as in `other`.
-
-    Volumes of one number are compared.
-    """
-    total = 0.0
+def list_extents(roof, site):
+    """Return the units (v,) of how far each volume extends."""
+    extents = np.zeros(len(roof.sides))
     for k in range(roof.counts[VOLUME_COUNT]):
-        is_same = k < other.counts[VOLUME_COUNT] and other.n_planes[k] > 0
+        extents[k] = price_extent(roof, k, site) if roof.n_planes[k] > 0 else 0.0
+    return extents
+
+
+@compiled
+def compare_extents(roof, trial, extents, site):
+    """Return the units that a trial saves by extending less than a roof of `extents` (v,)."""
+    total = 0.0
+    for k in range(trial.counts[VOLUME_COUNT]):
+        is_same = k < roof.counts[VOLUME_COUNT] and trial.n_planes[k] > 0 and roof.n_planes[k] > 0
         for s in range(N_SIDES):
-            is_same &= roof.sides[k, s] == other.sides[k, s]
-        if roof.n_planes[k] > 0 and not is_same:
-            total += price_extent(roof, k, site)
+            is_same &= roof.sides[k, s] == trial.sides[k, s]
+        if not is_same:
+            total += extents[k]
+            total -= price_extent(trial, k, site) if trial.n_planes[k] > 0 else 0.0
     return total
 
 
@@ -257,15 +264,6 @@ def count_skew_planes(roof, k):
 
 
 @compiled
-def price_all_units(roof, site):
-    """Return the units (2,) of a roof's tables and of how far its volumes extend."""
-    extents = 0.0
-    for k in range(roof.counts[VOLUME_COUNT]):
-        extents += price_extent(roof, k, site) if roof.n_planes[k] > 0 else 0.0
-    return np.array([price_tables(roof), extents])
-
-
-@compiled
 def know(roof, drawing, site):
     """Return what is known of a roof."""
     box = np.array([-np.inf, np.inf, -np.inf, np.inf])
@@ -274,7 +272,8 @@ def know(roof, drawing, site):
         compute_costs(roof, site, list_view(roof, box.reshape(1, 4)), np.arange(len(site.x))),
         corners,
         steps,
-        price_all_units(roof, site),
+        price_tables(roof),
+        list_extents(roof, site),
     )
 
 
@@ -291,7 +290,7 @@ def know_change(roof, drawing, site, boxes, reach, known):
         new_corners, new_steps = draw_structure(roof, drawing, site, wide, np.inf)
         corners = replace_inside(corners, new_corners, wide)
         steps = replace_inside(steps, new_steps, wide)
-    return Known(known.costs, corners, steps, price_all_units(roof, site))
+    return Known(known.costs, corners, steps, price_tables(roof), list_extents(roof, site))
 
 
 @compiled
@@ -328,7 +327,7 @@ def count_known_units(known, box):
 def price_known(known, site):
     """Return the price (points) of the roof that is known."""
     everywhere = np.array([-np.inf, np.inf, -np.inf, np.inf])
-    units = known.units.sum() + count_known_units(known, everywhere)
+    units = known.units + known.extents.sum() + count_known_units(known, everywhere)
     return known.costs.sum() + site.unit * units
 
 

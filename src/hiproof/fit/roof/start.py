@@ -57,7 +57,7 @@ def start_roof(whole: Whole, site: Site, quantile: float = BASE_QUANTILE) -> Tab
     base[OFFSET0 : OFFSET0 + LEVEL] = np.inf
     base[OFFSET0 + LEVEL] = z[int(quantile * (len(z) - 1))]
     base[U0 : V1 + 1] = whole.box
-    put_on_walls(roof, add_volume(roof, base, whole.turn), site, False)
+    add_volume(roof, base, whole.turn, site, False)
     return roof
 
 
@@ -96,18 +96,21 @@ def append_roof(roof, other):
         place_volume(roof, new)
 
 
-def add_volume(roof: Tables, volume: np.ndarray, turns: np.ndarray) -> int:
-    """Add a volume with the sides of its rectangle. Returns its number."""
-    row = int(roof.counts[VOLUME_COUNT])
+@compiled
+def add_volume(roof, volume, turns, site, is_new):
+    """Add a volume with the sides of its rectangle, put on walls. Returns its number."""
+    row = roof.counts[VOLUME_COUNT]
     roof.counts[VOLUME_COUNT] += 1
-    roof.replaces[row], roof.n_planes[row] = volume[REPLACES] > 0, 0
+    roof.replaces[row], roof.n_planes[row] = int(volume[REPLACES] > 0.0), 0
     c, s = turns[int(volume[DIRECTION])]
     axes = np.array([[c, s], [-s, c]])
-    for edge, place in enumerate(volume[U0 : V1 + 1].tolist()):
+    for edge in range(N_SIDES):
+        (a, b), place = axes[edge // 2], volume[U0 + edge]
         sign = 1.0 if edge % 2 == 0 else -1.0
-        roof.sides[row, edge] = add_line(roof, *(sign * axes[edge // 2]), -sign * place)
+        roof.sides[row, edge] = add_line(roof, sign * a, sign * b, -sign * place)
     add_planes(roof, row, volume, axes)
     place_volume(roof, row)
+    put_on_walls(roof, row, site, is_new)
     return row
 
 
@@ -174,34 +177,28 @@ def move_eaves(roof, k, line):
             roof.values[roof.heights[k, p]] += roof.values[roof.slopes[k, p]] * (f - c)
 
 
-def add_planes(roof: Tables, row: int, volume: np.ndarray, axes: np.ndarray) -> None:
+@compiled
+def add_planes(roof, row, volume, axes):
     """Add the planes of a volume: each rises from the middle of a side, equal slopes are shared."""
     offsets = np.clip(volume[U0 : V1 + 1], -FAR_M, FAR_M)
     middle = np.array([0.5 * (offsets[0] + offsets[1]), 0.5 * (offsets[2] + offsets[3])])
-    slopes: dict[int, int] = {}
-    ties = group_slopes(volume)
-    for p in np.flatnonzero(np.isfinite(volume[OFFSET0 : OFFSET0 + LEVEL + 1])).tolist():
-        z = volume[OFFSET0 + p]
-        if p == LEVEL:
-            add_plane(roof, row, roof.sides[row, 0], add_unknown(roof, z), NO_UNKNOWN)
+    slopes = np.full(LEVEL, NO_UNKNOWN)
+    for p in range(LEVEL):
+        z, slope, lean = volume[OFFSET0 + p], volume[SLOPE0 + p], volume[LEAN0 + p]
+        if not np.isfinite(z):
             continue
-        slope, lean = volume[SLOPE0 + p], volume[LEAN0 + p]
-        rise = np.array([1.0 if p % 2 == 0 else -1.0, lean])
-        rise = rise if p < 2 else rise[::-1]
-        place = middle.copy()
-        place[p // 2] = offsets[p]
-        length = float(np.hypot(*rise))
-        tie = ties[p]
-        if tie not in slopes:
+        along, across = 1.0 if p % 2 == 0 else -1.0, lean
+        u, v = (along, across) if p < 2 else (across, along)
+        x, y = (offsets[p], middle[1]) if p < 2 else (middle[0], offsets[p])
+        length = np.sqrt(1.0 + lean * lean)
+        tie = 0 if volume[TIE] == ALL_EQUAL else p // 2 * 2 if volume[TIE] == OPPOSITE else p
+        if slopes[tie] == NO_UNKNOWN:
             slopes[tie] = add_unknown(roof, slope * length)
-        normal = rise / length
-        line = add_line(roof, *(normal @ axes), -float(normal @ place))
-        height = add_unknown(roof, z + slope * float(rise @ place))
+        a = (u * axes[0, 0] + v * axes[1, 0]) / length
+        b = (u * axes[0, 1] + v * axes[1, 1]) / length
+        line = add_line(roof, a, b, -(u * x + v * y) / length)
+        height = add_unknown(roof, z + slope * (u * x + v * y))
         add_plane(roof, row, line, height, slopes[tie])
-
-
-def group_slopes(volume: np.ndarray) -> list[int]:
-    """Return which slopes are equal under the volume's tie."""
-    if volume[TIE] == ALL_EQUAL:
-        return [0, 0, 0, 0]
-    return [0, 0, 2, 2] if volume[TIE] == OPPOSITE else [0, 1, 2, 3]
+    if np.isfinite(volume[OFFSET0 + LEVEL]):
+        height = add_unknown(roof, volume[OFFSET0 + LEVEL])
+        add_plane(roof, row, roof.sides[row, 0], height, NO_UNKNOWN)
