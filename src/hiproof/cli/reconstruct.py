@@ -64,8 +64,12 @@ def reconstruct(
 
         found, epochs = choose_clouds(clouds or (), epoch or ())
         settings = read_settings()
-        if enrich:
-            refuse_before(settings)
+        if enrich:  # what would end it after the run is refused before
+            from ..enrich.cadastre import refuse_unusable
+            from ..enrich.energy import refuse_other_citygml
+
+            refuse_unusable(settings.enrich)
+            refuse_other_citygml(settings)
         return Request(
             clouds=found,
             epochs=epochs,
@@ -103,15 +107,6 @@ def refuse_lone_options(epoch: list[str] | None, enrich: bool, changes: Changes)
             "expected surveys (--epoch) with --shift, which puts one on another, got none; name "
             "each with --epoch DATE=CLOUD, or leave out --shift"
         )
-
-
-def refuse_before(settings: Settings) -> None:
-    """Raise InputError before a run for what would end `hiproof enrich` after it."""
-    from ..enrich.cadastre import refuse_unusable
-    from ..enrich.energy import refuse_other_citygml
-
-    refuse_unusable(settings.enrich)
-    refuse_other_citygml(settings)
 
 
 def find_settings_file(*inputs: str | None) -> Path | None:

@@ -22,16 +22,11 @@ def settings(*, config: Path | None = None, write: Path | None = None) -> None:
     from ..write.files import refuse_overwriting, save_text
 
     refuse_overwriting([write], [config])
-    refuse_other_files(write)
-    save_text(write, text)
-
-
-def refuse_other_files(path: Path) -> None:
-    """Raise OutputError where a file at `path` is none of settings."""
     try:
-        if path.is_file():
-            Settings.from_toml(path)
+        if write.is_file():
+            Settings.from_toml(write)
     except HiproofError as error:
         raise OutputError(
-            f"expected a new file or one of settings to write, got {path}; choose another name"
+            f"expected a new file or one of settings to write, got {write}; choose another name"
         ) from error
+    save_text(write, text)

@@ -20,7 +20,6 @@ from ..primitives.catalogue import CATALOGUE
 from ..primitives.revolved import NECK
 from ..primitives.table import PARAMETER_ROWS, evaluate
 from .view import (
-    SeenFace,
     bound_sphere,
     list_colours,
     project_points,
@@ -127,22 +126,15 @@ def primitive_svg(kind: str) -> str:
         f"<title>{kind}</title>",
         '<rect x="-2000" y="-2000" width="4000" height="4000" fill="white"/>',
         *(
-            face_path(face)
+            f'<path d="{draw_rings(FIGURE_SCALE * ring for ring in face.rings)}" '
+            f'fill="{shade_colour(face.colour, face.light)}" stroke="#333" stroke-width="1" '
+            'fill-opacity="0.8"/>'
             for face in select_seen_faces(building.solid, colours, FIGURE_TURN_DEG, FIGURE_TILT_DEG)
         ),
         *(draw_measure(*line) for line in lines),
         "</svg>",
     ]
     return "\n".join(text) + "\n"
-
-
-def face_path(face: SeenFace) -> str:
-    d = draw_rings(FIGURE_SCALE * ring for ring in face.rings)
-    return (
-        f'<path d="{d}" fill="{shade_colour(face.colour, face.light)}" stroke="#333" '
-        'stroke-width="1" '
-        'fill-opacity="0.8"/>'
-    )
 
 
 def draw_measure(measure: Measure, page: np.ndarray) -> str:

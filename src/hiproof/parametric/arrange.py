@@ -106,7 +106,9 @@ def add_dormer(roof: Roof, index: int, place: tuple[float, float] | None = None)
     is level it is a flat block, turned as the part is.
     """
     part = roof.parts[index]
-    x, y = place if place is not None else place_on_slope(part)
+    down = np.array([math.sin(part.kappa), -math.cos(part.kappa)])
+    middle = part.translation[:2] + 0.25 * part.parameters.get("width", 0.0) * down
+    x, y = middle if place is None else place
     surroundings = np.array([[x, y], [x + 0.01, y], [x, y + 0.01]])
     z = np.max([piece.height_at(surroundings) for piece in part.pieces], axis=0)
     slope = np.array([z[1] - z[0], z[2] - z[0]]) / 0.01
@@ -126,15 +128,6 @@ def add_dormer(roof: Roof, index: int, place: tuple[float, float] | None = None)
         "position": [float(x), float(y), eave],
         "rotation": math.degrees(math.atan2(-slope[1], -slope[0])),
     }
-
-
-def place_on_slope(part: Any) -> tuple[float, float]:
-    """Return a place half-way between the ridge and the front eave."""
-    width = part.parameters.get("width", 0.0)
-    x, y = part.translation[:2] - 0.25 * width * np.array(
-        [-math.sin(part.kappa), math.cos(part.kappa)]
-    )
-    return float(x), float(y)
 
 
 def find_axis(part: Values, side: str) -> np.ndarray:

@@ -89,8 +89,12 @@ def use_fallback(
     is known.
     """
     heights = read_fallback(building.attributes, settings.read)
-    if override is not None:
-        heights = prefer_override(heights, override)
+    if override is not None:  # its heights count before those of attributes
+        ridge = override.fixed.get("ridge_height")
+        if ridge is not None:
+            heights = FallbackHeights(ridge, None, heights.ground_m)
+        if override.z_ground is not None:
+            heights = dataclasses.replace(heights, ground_m=override.z_ground)
     is_known = heights.roof_m is not None or heights.block_m is not None
     if (
         building.status not in WITHOUT_POINTS
@@ -103,16 +107,6 @@ def use_fallback(
         return build_block(building, heights, terrain, settings)
     except CompositionError as error:
         return add_remark(building, f"its heights make no block: {error}")
-
-
-def prefer_override(heights: FallbackHeights, override: Override) -> FallbackHeights:
-    """Return the heights, with those of the override instead where it has some."""
-    ridge = override.fixed.get("ridge_height")
-    if ridge is not None:
-        heights = FallbackHeights(ridge, None, heights.ground_m)
-    if override.z_ground is not None:
-        heights = dataclasses.replace(heights, ground_m=override.z_ground)
-    return heights
 
 
 def build_block(

@@ -43,6 +43,7 @@ LEFT, RIGHT, FRONT, BACK, LEVEL = range(5)  # the side that a plane rises from: 
 
 Plane = tuple[Formula | float, Formula | float, Formula | float]
 Parameters = Mapping[str, float]  # theta_p by name
+Placed = tuple[dict[str, float], float, np.ndarray]  # theta_p, kappa and T_L (3,)
 Shape = tuple[float, ...]  # V, U, q0..q3
 # The corners of a plan as shares of its half extents.
 RECTANGLE = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
@@ -203,15 +204,6 @@ class Primitive:
         length, angle = width * rng.uniform(1.05, 2.2), rng.uniform(20.0, 45.0)
         return self.typical(width, length, 0.5 * width * math.tan(math.radians(angle)))
 
-    def from_member(self, member: Any) -> tuple[float, ...]:
-        """Return q with the slopes of a member's front and right; FitError without a family."""
-        if self.read_member is None:
-            raise FitError(
-                f"expected a shape of at most one plane a side, got {self.name}; name its "
-                "parameters"
-            )
-        return self.read_member(member)
-
     def to_theta(
         self,
         theta_p: Parameters,
@@ -225,7 +217,7 @@ class Primitive:
         theta[Q0] += translation[2]
         return theta
 
-    def from_theta(self, theta: np.ndarray) -> tuple[dict[str, float], float, np.ndarray]:
+    def from_theta(self, theta: np.ndarray) -> Placed:
         """Return the named theta_p, kappa and T_L (3,) of `theta` (9,)."""
         *measures, eave = self.measures_at(np.asarray(theta, float)[HALF_WIDTH:].tolist())
         theta_p = dict(zip(self.measures, measures, strict=True))

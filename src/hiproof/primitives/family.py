@@ -24,7 +24,7 @@ Where walls cut a corner of the rectangle off it may have planes over these, too
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -48,6 +48,7 @@ from .contract import (
     RIGHT,
     SIDES,
     Parameters,
+    Placed,
     Primitive,
 )
 
@@ -151,11 +152,10 @@ class Member:
 
     def those(self, which: int | list[int]) -> Member:
         """Select one or some of several."""
-        centre, half, eaves, slopes, leans = (
-            of[:, which] for of in (self.centre, self.half, self.eaves, self.slopes, self.leans)
-        )
+        names = ("centre", "half", "eaves", "slopes", "top", "leans")
+        selected = {name: getattr(self, name)[..., which] for name in names}
         cants = self.cants[..., which] if self.cants.shape[1] else no_cants()
-        return Member(self.kappa, centre, half, eaves, slopes, self.top[which], leans, cants)
+        return replace(self, **selected, cants=cants)
 
     def compute_local_planes(self) -> list[tuple[float, float, float]]:
         """Return planes a, b, c over u, v about the centre: sides in order, cants, the top."""
@@ -285,25 +285,30 @@ class Member:
 
     def theta(self, shape: Primitive) -> np.ndarray:
         """Return theta (9,) or (9, m) of `shape`, whose front and right side stand for all."""
+        if shape.read_member is None:
+            raise FitError(
+                f"expected a shape of at most one plane a side, got {shape.name}; name its "
+                "parameters"
+            )
         theta = np.zeros((9, *self.eaves.shape[1:]))
         theta[:KAPPA], theta[KAPPA] = self.centre, self.kappa
         theta[HALF_WIDTH], theta[HALF_LENGTH] = self.half[1], self.half[0]
-        for k, q in enumerate(shape.from_member(self)):
+        for k, q in enumerate(shape.read_member(self)):
             theta[Q0 + k] = q
         return theta
 
-    def describe(self, as_catalogue: bool = True) -> tuple[dict[str, float], float, np.ndarray]:
+    def describe(self, as_catalogue: bool = True) -> Placed:
         """Return named parameters, kappa and T_L (3,), in the canonical direction."""
         return self.canonical().in_words(as_catalogue)
 
-    def in_words(self, as_catalogue: bool) -> tuple[dict[str, float], float, np.ndarray]:
+    def in_words(self, as_catalogue: bool) -> Placed:
         """Describe a member that is in its canonical direction."""
         if not as_catalogue or self.in_catalogue is None:
             return self.side_by_side()
         shape, theta = self.in_catalogue
         return shape.from_theta(theta)
 
-    def side_by_side(self) -> tuple[dict[str, float], float, np.ndarray]:
+    def side_by_side(self) -> Placed:
         """Return each side's own named parameters, kappa and T_L (3,)."""
         parameters = {name: float(value) for name, value in self.list_side_measures().items()}
         return parameters, self.kappa, np.array([*self.centre, self.base])
@@ -361,7 +366,7 @@ class Member:
         changes: Member,
         untold: int,
         as_catalogue: bool,
-        words: tuple[dict[str, float], float, np.ndarray],
+        words: Placed,
     ) -> dict[str, float]:
         """Return deviations of a part's parameters (`words`) and t_z by name."""
         parameters, kappa, translation = words

@@ -66,7 +66,7 @@ def make_shapes(
         or (lods <= {"2.2", "2.3"} and write.parts_as == "one")
     ):
         return Shapes()
-    from ..compose.blocks import block
+    from ..compose.blocks import block, blocks
 
     solid = building.model.on_one_level
     ground = solid.select_faces(GROUND)[0]
@@ -75,11 +75,16 @@ def make_shapes(
     lod12 = None
     if lods & {"1.2", "1.3"}:  # as high as 7/10 of the roof lie below, as in 3DBAG
         lod12 = block(solid.project_face(ground), figures.h_base, metres(figures.h_70p))
+    lod13 = None
+    if "1.3" in lods and not parts:  # as high as 7/10 of the roof of each part lie below
+        heights = [metres(roof_figures(part.solid).h_70p) for part in cut]
+        outlines = [part.outline for part in cut]
+        lod13 = (blocks(outlines, heights, figures.h_base) if cut else None) or lod12
     return Shapes(
         outline=ground if "0" in lods else None,
         z_edge=metres(figures.h_eave),
         lod12=lod12 if "1.2" in lods else None,
-        lod13=None if parts or "1.3" not in lods else make_stepped_block(cut, figures) or lod12,
+        lod13=lod13,
         parts=parts,
     )
 
@@ -101,14 +106,6 @@ def cut_into_parts(building: Building) -> tuple[BuildingPart, ...]:
         )
     except CompositionError:
         return ()
-
-
-def make_stepped_block(cut: tuple[BuildingPart, ...], figures: RoofFigures) -> Solid | None:
-    """Return LoD1.3: a block a part as high as 7/10 of its roof lie below."""
-    from ..compose.blocks import blocks
-
-    heights = [metres(roof_figures(part.solid).h_70p) for part in cut]
-    return blocks([part.outline for part in cut], heights, figures.h_base) if cut else None
 
 
 def part_shapes(

@@ -122,18 +122,15 @@ def boundary_surfaces(
 
 def list_face_rings(faces: Iterable[Face], xyz: np.ndarray) -> list[str]:
     """Return the rings of each of the faces over the vertices `xyz` (n, 3)."""
-    place = positions(xyz)
-    return [polygon_rings(face, place) for face in faces]
-
-
-def polygon_rings(face: Face, place: list[str]) -> str:
-    """Return the rings of a face; `place` has the vertices as text."""
-    text = ""
-    for number, ring in enumerate(face.rings):
-        bound = "gml:interior" if number else "gml:exterior"
-        closed = position_list([place[vertex] for vertex in (*ring, ring[0])])
-        text += f"<{bound}><gml:LinearRing>{closed}</gml:LinearRing></{bound}>"
-    return text
+    place, texts = positions(xyz), []
+    for face in faces:
+        text = ""
+        for number, ring in enumerate(face.rings):
+            bound = "gml:interior" if number else "gml:exterior"
+            closed = position_list([place[vertex] for vertex in (*ring, ring[0])])
+            text += f"<{bound}><gml:LinearRing>{closed}</gml:LinearRing></{bound}>"
+        texts.append(text)
+    return texts
 
 
 def position_list(place: list[str]) -> str:

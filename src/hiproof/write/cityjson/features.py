@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 from collections.abc import Iterable
 from contextlib import ExitStack
 from dataclasses import replace
@@ -127,20 +128,16 @@ class CityJSONWriter(BuildingWriter):
 
     def finish(self) -> None:
         if self.is_document:
-            self.append_waiting_vertices()
+            self.file.write(b'},\n"vertices":[')
+            self.waiting.seek(0)
+            shutil.copyfileobj(self.waiting, self.file)
+            self.file.write(b"]}\n")
         translate = np.zeros(3) if self.head.offset is None else self.head.offset
         extent = (
             [metres(v) for v in (*self.low, *self.high)] if np.isfinite(self.low).all() else None
         )
         self.file.seek(0)
         self.file.write(self.header(translate, extent).ljust(self.header_length))
-
-    def append_waiting_vertices(self) -> None:
-        self.file.write(b'},\n"vertices":[')
-        self.waiting.seek(0)
-        while chunk := self.waiting.read(1 << 20):
-            self.file.write(chunk)
-        self.file.write(b"]}\n")
 
     def header(self, translate: np.ndarray, extent: list[float] | None) -> bytes:
         """Return the first line; of a document, all before the first object."""

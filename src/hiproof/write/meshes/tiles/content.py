@@ -92,14 +92,6 @@ def make_schema(properties: Iterable[Property]) -> Values:
     return {"id": "hiproof", "classes": {CLASS: {"properties": by_id}}}
 
 
-def add_table(
-    document: GlbDocument, properties: Sequence[Property], rows: Sequence[Values]
-) -> Values:
-    """Add the table of `rows`, values by attribute's name."""
-    columns = {p.id: add_column(document, p, [row.get(p.name) for row in rows]) for p in properties}
-    return {"name": "buildings", "class": CLASS, "count": len(rows), "properties": columns}
-
-
 def add_column(document: GlbDocument, column: Property, values: list[Any]) -> Values:
     if column.is_number:
         numbers = np.array([NO_NUMBER if v is None else v for v in values], "<f8")
@@ -146,7 +138,8 @@ def tile_glb(
         "meshes": [{"primitives": [primitive(document, meshes, corners - middle)]}],
         "materials": [PAINTED],
     }
-    table = add_table(document, properties, rows)
+    columns = {p.id: add_column(document, p, [row.get(p.name) for row in rows]) for p in properties}
+    table = {"name": "buildings", "class": CLASS, "count": len(rows), "properties": columns}
     document.tables["extensions"] = {
         EXTENSION: {"schema": make_schema(properties), "propertyTables": [table]}
     }
