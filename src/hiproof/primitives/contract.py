@@ -68,7 +68,8 @@ class DerivedStart:
         """Return theta (9,) with the plan of `source_theta` (9,) and q by formulas."""
         theta, shape = source_theta.copy(), source_theta[HALF_WIDTH:].tolist()
         for _ in range(self.quarters):
-            theta = turn_quarter(theta)
+            theta[[HALF_WIDTH, HALF_LENGTH]] = theta[[HALF_LENGTH, HALF_WIDTH]]
+            theta[KAPPA] += math.pi / 2
         theta[KAPPA] += self.turn
         theta[Q0 : Q0 + len(self.q)] = [
             q.at(shape) if isinstance(q, Formula) else q for q in self.q
@@ -336,11 +337,3 @@ def place_vertices(vertices: np.ndarray, kappa: float, translation: np.ndarray) 
     """Turn vertices (n, 3) by `kappa` about Z, and move by T_L (3,): R V + T_L, eq. 9."""
     c, s = math.cos(kappa), math.sin(kappa)
     return vertices @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) + translation
-
-
-def turn_quarter(theta: np.ndarray) -> np.ndarray:
-    """Exchange the plan axes by a quarter turn; the caller exchanges their q."""
-    theta = theta.copy()
-    theta[[HALF_WIDTH, HALF_LENGTH]] = theta[[HALF_LENGTH, HALF_WIDTH]]
-    theta[KAPPA] += math.pi / 2
-    return theta

@@ -25,26 +25,27 @@ from typing import Any, BinaryIO
 from ..errors import OutputError
 from ..formats import FORMATS
 
+EDQUOT = getattr(errno, "EDQUOT", -1)  # Windows has none
 ADVICE = {
     errno.ENOSPC: "the disk is full; free some space or choose another --out folder",
-    getattr(
-        errno, "EDQUOT", -1
-    ): "your disk quota is used up; free some space or choose another --out folder",
+    EDQUOT: "your disk quota is used up; free some space or choose another --out folder",
     errno.EFBIG: "the file grew beyond the size allowed here; raise the limit (ulimit -f) or write "
     "fewer buildings",
-    errno.EACCES: "permission denied; choose a folder you may write to",
-    errno.EPERM: "permission denied; choose a folder you may write to",
+    **dict.fromkeys(
+        (errno.EACCES, errno.EPERM), "permission denied; choose a folder you may write to"
+    ),
     errno.EROFS: "the file system is read-only; choose another folder",
-    errno.ENOTDIR: "a part of this path is a file, not a folder; choose another path",
-    errno.EEXIST: "a part of this path is a file, not a folder; choose another path",
+    **dict.fromkeys(
+        (errno.ENOTDIR, errno.EEXIST),
+        "a part of this path is a file, not a folder; choose another path",
+    ),
     errno.EISDIR: "a folder of this name is in the way; choose another file name",
     errno.ENAMETOOLONG: "the name is too long for this file system; choose a shorter one",
 }
 
 # Reading never fails so: in a block that writes, these are errors of writing whatever file they
 # name.
-# Windows has no EDQUOT
-ONLY_WRITING = (errno.ENOSPC, getattr(errno, "EDQUOT", -1), errno.EFBIG, errno.EROFS)
+ONLY_WRITING = (errno.ENOSPC, EDQUOT, errno.EFBIG, errno.EROFS)
 
 
 def output_error(path: str | os.PathLike, error: OSError) -> OutputError:

@@ -105,7 +105,18 @@ def write_models(path: Path, buildings: Iterable[ViewedModel], crs: str | None =
     if nodes:
         document.tables["scenes"] = [{"nodes": list(range(len(nodes)))}]
         document.tables |= {"nodes": nodes, "meshes": meshes}
-        document.tables["materials"] = [material_table(look) for look in materials]
+        document.tables["materials"] = [
+            {
+                "name": look.name,
+                "pbrMetallicRoughness": {
+                    "baseColorFactor": [*linear_rgb(look.colour), 1.0],
+                    "metallicFactor": 0.0,
+                    "roughnessFactor": 0.9,
+                },
+                "doubleSided": True,
+            }
+            for look in materials
+        ]
     with atomic_file(path) as file:
         file.write(document.to_bytes())
     return len(nodes)
@@ -123,15 +134,6 @@ def add_primitives(
         material = materials.setdefault(look, len(materials))
         primitives.append({"attributes": places, "material": material})
     return primitives
-
-
-def material_table(look: Look) -> Values:
-    surface = {
-        "baseColorFactor": [*linear_rgb(look.colour), 1.0],
-        "metallicFactor": 0.0,
-        "roughnessFactor": 0.9,
-    }
-    return {"name": look.name, "pbrMetallicRoughness": surface, "doubleSided": True}
 
 
 def flat_triangles(vertices: np.ndarray, faces: Sequence[Face]) -> tuple[np.ndarray, np.ndarray]:
