@@ -6,7 +6,6 @@ Contents that formats share:
 
 attribute_list         every attribute and table, declared once
 building_attributes    the attributes of one building
-roof_figures           heights, slopes, ridge and volume of a solid
 surfaces               faces that are one surface, such as the facets of a cone
 shapes                 LoD0, blocks and building parts, as far as requested
 colours                one colour a roof type
