@@ -54,23 +54,21 @@ def list_requested_files(settings: Settings, folder: Path) -> dict[str, Path]:
     ['buildings.gml', 'buildings.city.jsonl', 'parameters.jsonl', 'buildings.gpkg']
     """
     by_tile_alone = settings.city.models == "tiles"
-    written = {
-        n: format
-        for n, format in requested_formats(settings.write).items()
+    return {
+        name: folder / format.file
+        for name, format in requested_formats(settings.write).items()
         if not (by_tile_alone and format.tile_ending)
     }
-    return {name: folder / format.file for name, format in written.items()}
 
 
 def list_requested_tile_files(settings: Settings, folder: Path, tile: str) -> dict[str, Path]:
     """Return paths in `folder` of a work tile's files by format, none if a run writes none."""
     by_tile = settings.city.models != "merged"
-    requested = {
-        name: format
+    return {
+        name: folder / f"{tile}{format.tile_ending}"
         for name, format in requested_formats(settings.write).items()
         if by_tile and format.tile_ending
     }
-    return {name: folder / f"{tile}{format.tile_ending}" for name, format in requested.items()}
 
 
 def list_model_paths(settings: Settings, folder: Path) -> list[Path]:

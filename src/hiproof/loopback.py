@@ -190,11 +190,8 @@ class LoopbackHandler(BaseHTTPRequestHandler):
     def send(self, answer: Answer) -> None:
         self.connection.settimeout(QUIET_S)
         self.send_response(answer.code)
-        for name, value in {
-            "Content-Type": answer.kind,
-            "Content-Length": str(len(answer.body)),
-        }.items():
-            self.send_header(name, value)
+        self.send_header("Content-Type", answer.kind)
+        self.send_header("Content-Length", str(len(answer.body)))
         self.own = answer.headers
         self.end_headers()
         if self.command != "HEAD":

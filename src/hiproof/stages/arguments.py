@@ -12,21 +12,28 @@ from .recognise import asks_network
 
 def refuse_other_kinds(footprint: object, terrain: object, settings: object) -> None:
     """Raise InputError for arguments of another kind, by their names, whatever they hold."""
-    if footprint is not None and not isinstance(footprint, (shapely.Geometry, Footprint)):
-        raise InputError(
-            f"expected a polygon of shapely as footprint, got {type(footprint).__name__}; make a "
-            "shapely.Polygon of it"
-        )
-    if settings is not None and not isinstance(settings, Settings):
-        raise InputError(
-            f"expected hiproof.Settings as settings, got {type(settings).__name__}; make them by "
-            "Settings.from_dict"
-        )
-    if terrain is not None and not hasattr(terrain, "height_at"):
-        raise InputError(
-            f"expected a terrain that answers height_at, got {type(terrain).__name__}; read a "
-            "raster by hiproof.read_terrain"
-        )
+    for value, is_of_kind, kind, advice in (
+        (
+            footprint,
+            isinstance(footprint, (shapely.Geometry, Footprint)),
+            "a polygon of shapely as footprint",
+            "make a shapely.Polygon of it",
+        ),
+        (
+            settings,
+            isinstance(settings, Settings),
+            "hiproof.Settings as settings",
+            "make them by Settings.from_dict",
+        ),
+        (
+            terrain,
+            hasattr(terrain, "height_at"),
+            "a terrain that answers height_at",
+            "read a raster by hiproof.read_terrain",
+        ),
+    ):
+        if value is not None and not is_of_kind:
+            raise InputError(f"expected {kind}, got {type(value).__name__}; {advice}")
 
 
 def refuse_without_network(settings: Settings) -> None:

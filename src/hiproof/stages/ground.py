@@ -71,10 +71,8 @@ def find_ground(
     from ..compose.settle import PLAN_DIGITS, round_number
 
     if terrain is not None:
-        corners = np.concatenate(
-            [np.asarray(ring.coords)[:, :2] for ring in (outline.exterior, *outline.interiors)]
-        )
-        heights, source = query_terrain(terrain, frame.to_world(corners))
+        corners = frame.to_world(shapely.get_coordinates(outline))
+        heights, source = query_terrain(terrain, corners)
         if np.isfinite(heights).any():
             z = round_number(np.nanmin(heights), PLAN_DIGITS)
             unknown: list[np.ndarray] = []

@@ -83,12 +83,12 @@ def add_cautions(building: Building, points: np.ndarray, inner: Inner) -> Buildi
     """
     from ..evaluate.layers import find_second_surface
 
-    roof = [
-        building.solid.vertices[list(ring), 2]
+    lowest = min(
+        building.solid.vertices[list(ring), 2].min()
         for face in building.solid.select_faces(ROOF)
         for ring in face.rings
-    ]
-    sunk = building.z_ground - float(np.concatenate(roof).min())
+    )
+    sunk = building.z_ground - float(lowest)
     if sunk > SUNK_M:
         building = add_remark(
             building,

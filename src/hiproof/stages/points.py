@@ -22,12 +22,11 @@ def usable(
     points: np.ndarray, footprint: shapely.Polygon | None
 ) -> tuple[np.ndarray, shapely.Polygon | None, Status]:
     """Return finite, distinct points inside the footprint, whatever order they came in."""
-    if footprint is not None:
-        footprint = largest_polygon(footprint)
-        if footprint.is_empty or not footprint.area >= 0.1:
-            return np.zeros((0, 3)), None, Status.BAD_FOOTPRINT
     points = finite(points)
     if footprint is not None:
+        footprint = largest_polygon(footprint)
+        if not footprint.area >= 0.1:
+            return np.zeros((0, 3)), None, Status.BAD_FOOTPRINT
         points = compress_inside(points, footprint)
     points = distinct(points)
     if len(points) == 0:
@@ -78,12 +77,7 @@ def distinct(points: np.ndarray) -> np.ndarray:
     if (plan[order[1:]] != plan[order[:-1]]).all():  # none over another, as nearly always
         return points.take(order, axis=0)
     points = points[np.lexsort(points.T[::-1])]
-    differs = points[1:] != points[:-1]
-    return (
-        points[np.r_[True, differs[:, 0] | differs[:, 1] | differs[:, 2]]]
-        if len(points)
-        else points
-    )
+    return points[np.r_[True, (points[1:] != points[:-1]).any(axis=1)]]
 
 
 def on_a_line(xy: np.ndarray) -> bool:

@@ -110,16 +110,11 @@ def refuse_unknown_types(fit: Any) -> None:
     if unknown:
         import difflib
 
-        nearby = [
-            difflib.get_close_matches(name.lower(), allowed, n=1, cutoff=0.5) for name in unknown
-        ]
-        meant = [
-            f"{format_value(name)} (did you mean {result[0]}?)" if result else format_value(name)
-            for name, result in zip(unknown, nearby, strict=True)
-        ]
-        raise SettingsError(
-            f"expected roof types among {', '.join(allowed)}, got {', '.join(meant)}"
-        )
+        got = []
+        for name in unknown:
+            nearby = difflib.get_close_matches(name.lower(), allowed, n=1, cutoff=0.5)
+            got.append(" ".join([format_value(name), *(f"(did you mean {k}?)" for k in nearby)]))
+        raise SettingsError(f"expected roof types among {', '.join(allowed)}, got {', '.join(got)}")
 
 
 def refuse_crs(read: Any) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import shapely
@@ -38,12 +39,12 @@ def jobs_from_cloud(
     from ...classify.split import split_buildings
 
     progress("read", 0, None)
-    names = select_clouds(request, headers, units)
+    box: Any = None if request.bbox is None else tuple(units.to_metres(request.bbox))
+    names = request.clouds if box is None else select_clouds(request.clouds, box, headers, units)
     cloud = readable_points(names, settings)
     has_roofs = not settings.read.by_class or np.isin(cloud.classes, settings.read.building_classes)
     if len(names) < len(request.clouds) and not np.any(has_roofs):
         return (), settings
-    box = None if request.bbox is None else box_in_metres(request.bbox, units)
     buildings = split_buildings(cloud, settings, box, progress)
     if settings.read.roofs == "shape" and buildings and buildings[0].is_cut_out:
         roofs = count_things(len(buildings), "roof") if len(buildings) > 1 else "one roof"
@@ -56,21 +57,13 @@ def jobs_from_cloud(
 
 
 def select_clouds(
-    request: Request, headers: list[PointFileHeader], units: Units
+    clouds: tuple[str, ...], box: Box, headers: list[PointFileHeader], units: Units
 ) -> tuple[str, ...]:
-    """Return the point files to look for buildings in: all, or those near the box."""
-    if request.bbox is None:
-        return request.clouds
+    """Return the point files to look for buildings in: those near the box."""
     boxes = units.to_metres(list_boxes(headers))
-    gaps = shapely.distance(shapely.box(*box_in_metres(request.bbox, units)), shapely.box(*boxes.T))
+    gaps = shapely.distance(shapely.box(*box), shapely.box(*boxes.T))
     distant = {header.path for header, gap in zip(headers, gaps, strict=True) if gap > MOST_BLOCK_M}
-    return tuple(name for name in request.clouds if name not in distant)
-
-
-def box_in_metres(box: Box, units: Units) -> Box:
-    """Convert a box in `units` to world metres."""
-    xmin, ymin, xmax, ymax = units.to_metres(box)
-    return xmin, ymin, xmax, ymax
+    return tuple(name for name in clouds if name not in distant)
 
 
 def readable_points(clouds: tuple[str, ...], settings: Settings) -> PointCloud:

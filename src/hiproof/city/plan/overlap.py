@@ -44,19 +44,16 @@ def check_overlap(
     files = units.from_metres(bounds)
     moved = units.from_metres((boxes[:, :2] + boxes[:, 2:]) / 2)
     middles = reproject_positions(moved, cloud_crs, footprints_crs)
-    guess = next(
-        (
-            subject
-            for subject, xy in slips(middles, footprints_crs, cloud_crs)
-            if any_inside(xy, files)
-        ),
-        None,
-    )
+    advice = "check the CRS each file names, or say the cloud's with --crs"
+    for guess, xy in slips(middles, footprints_crs, cloud_crs):
+        finite = shapely.points(xy[np.isfinite(xy).all(axis=1)])
+        if len(shapely.STRtree(finite).query(shapely.box(*files.T))[0]):
+            advice = guess
+            break
     raise InputError(
         f"expected footprints that overlap the cloud in {extent(files[:, :2], files[:, 2:])} "
         f"({describe_crs(cloud_crs)}), "
-        f"got footprints in {extent(middles, middles)} ({describe_crs(footprints_crs)}); "
-        + (guess or "check the CRS each file names, or say the cloud's with --crs")
+        f"got footprints in {extent(middles, middles)} ({describe_crs(footprints_crs)}); " + advice
     )
 
 
@@ -143,8 +140,3 @@ def utm_zones(lon_lat: np.ndarray) -> Iterator[CRS]:
             + [32600 + zone]
         )
         yield from map(CRS.from_epsg, north if lat > 0 else [32700 + zone])
-
-
-def any_inside(xy: np.ndarray, boxes: np.ndarray) -> bool:
-    finite = xy[np.isfinite(xy).all(axis=1)]
-    return len(shapely.STRtree(shapely.points(finite)).query(shapely.box(*boxes.T))[0]) > 0

@@ -43,6 +43,7 @@ from .work_plan import (
     WorkPlan,
     choose_file_offset,
     cut_into_tiles,
+    enclose,
     make_job,
     make_jobs,
     unusual_names,
@@ -137,7 +138,8 @@ def list_places(boxes: np.ndarray) -> np.ndarray:
 
     Buildings are looked for there first.
     """
-    x, y = np.linspace(boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0), 8).T
+    lower, upper = np.reshape(enclose(boxes), (2, 2))
+    x, y = np.linspace(lower, upper, 8).T
     return np.column_stack([grid.ravel() for grid in np.meshgrid(x, y)])
 
 
@@ -214,18 +216,13 @@ def select_neighbours(
     """Return those of a data set near the requested footprints, without these themselves."""
     if data_set is footprints:
         return []
-    polygons_requested = np.array([f.polygon for f in footprints if not f.polygon.is_empty])
-    own_polygons = set(shapely.to_wkb(polygons_requested).tolist())
-    neighbours = [
-        f for f in data_set if not f.polygon.is_empty and f.polygon.wkb not in own_polygons
-    ]
-    if not len(polygons_requested) or not neighbours:
-        return []
-    polygons = np.array([f.polygon for f in neighbours])
-    nearby = shapely.STRtree(polygons_requested).query(
-        polygons, predicate="dwithin", distance=MOST_ROW_M
-    )[0]
-    return [neighbours[i] for i in np.unique(nearby)]
+    requested = [f.polygon for f in footprints if not f.polygon.is_empty]
+    own = {polygon.wkb for polygon in requested}
+    neighbours = [f for f in data_set if not f.polygon.is_empty and f.polygon.wkb not in own]
+    polygons = np.array([f.polygon for f in neighbours], object)
+    tree = shapely.STRtree(requested)
+    near = tree.query(polygons, predicate="dwithin", distance=MOST_ROW_M)[0]
+    return [neighbours[i] for i in np.unique(near)]
 
 
 def all_footprints(request: Request, frame: AreaFrame, headers: list) -> tuple[Footprint, ...]:
@@ -236,11 +233,7 @@ def all_footprints(request: Request, frame: AreaFrame, headers: list) -> tuple[F
     What is odd about them has been said of those that are asked for.
     """
     bounds, path = plan_bounds(headers), str(request.footprints)
-    box = (
-        (*bounds[:, :2].min(axis=0).tolist(), *bounds[:, 2:].max(axis=0).tolist())
-        if len(bounds)
-        else None
-    )
+    box: Any = tuple(enclose(bounds)) if len(bounds) else None
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", InputWarning)
         return read_requested_footprints(
@@ -326,9 +319,9 @@ def refuse_box_elsewhere(bbox: Box | None, bounds: np.ndarray) -> None:
         or shapely.intersects(shapely.box(*bbox), shapely.box(*bounds.T)).any()
     ):
         return
-    extent = [*bounds[:, :2].min(axis=0), *bounds[:, 2:].max(axis=0)]
+    extent = format_box(enclose(bounds).tolist())
     raise InputError(
-        f"expected a --bbox that meets the clouds, which lie in {format_box(extent)}, got "
+        f"expected a --bbox that meets the clouds, which lie in {extent}, got "
         f"{format_box(bbox)}; give it in their coordinates"
     )
 

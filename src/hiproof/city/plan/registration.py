@@ -11,6 +11,7 @@ import dataclasses
 import hashlib
 import math
 import warnings
+from collections import Counter
 from collections.abc import Callable, Iterator
 from itertools import product
 
@@ -163,11 +164,11 @@ def footprints_by_cell(polygons: np.ndarray) -> dict[Cell, int]:
     half a roof fits its footprint in many places.
     """
     bounds = np.floor(shapely.bounds(polygons).reshape(-1, 4) / SAMPLE_CELL_M).astype(np.int64)
-    reached = np.unique(bounds[(bounds[:, :2] < bounds[:, 2:]).any(axis=1)], axis=0).tolist()
-    spans = [(range(x, last_x + 1), range(y, last_y + 1)) for x, y, last_x, last_y in reached]
-    places, counts = np.unique(bounds[:, :2], axis=0, return_counts=True)
-    lower = zip(map(tuple, places.tolist()), counts.tolist(), strict=True)
-    return dict.fromkeys((cell for span in spans for cell in product(*span)), 0) | dict(lower)
+    number_of: Counter[Cell] = Counter()
+    for column, row, last_column, last_row in bounds.tolist():
+        for cell in product(range(column, last_column + 1), range(row, last_row + 1)):
+            number_of[cell] += cell == (column, row)
+    return number_of
 
 
 def sample_cells(number_of: dict[Cell, int], boxes: np.ndarray) -> tuple[list[Cell], set[int]]:

@@ -127,7 +127,7 @@ class WorkPlan:
         else:
             boxes = shapely.bounds([job.area for job in self.jobs])
             reach_m = max(self.around_m, self.beyond_m)
-        return np.hstack([np.floor(boxes[:, :2] - reach_m), np.ceil(boxes[:, 2:] + reach_m) + 1.0])
+        return grow_boxes(boxes, reach_m) + [0.0, 0.0, 1.0, 1.0]
 
     @functools.cached_property
     def units(self) -> Units:
@@ -295,13 +295,14 @@ def neighbourhood(job: Job, reach_m: float) -> np.ndarray:
 
     Whole metres keep the terrain cells of a building the same whatever tile it is computed in.
     """
-    xmin, ymin, xmax, ymax = job.area.bounds
-    return np.array(
-        [
-            math.floor(xmin - reach_m),
-            math.floor(ymin - reach_m),
-            math.ceil(xmax + reach_m),
-            math.ceil(ymax + reach_m),
-        ],
-        float,
-    )
+    return grow_boxes(np.array(job.area.bounds), reach_m)
+
+
+def grow_boxes(boxes: np.ndarray, reach_m: float) -> np.ndarray:
+    """Return boxes (..., 4) grown by a distance, up to whole metres."""
+    return np.hstack([np.floor(boxes[..., :2] - reach_m), np.ceil(boxes[..., 2:] + reach_m)])
+
+
+def enclose(boxes: np.ndarray) -> np.ndarray:
+    """Return the box (4,) around boxes (n, 4)."""
+    return shapely.total_bounds(shapely.box(*boxes.T))

@@ -34,6 +34,7 @@ from ...masking import mask, masked_values
 from ...model import Footprint
 from ...parametric.override import NOTE_KEYS, Override, read_override
 from ...read.points.las import translate_errors
+from ...read.points.pointcloud import in_box
 from ...settings import Settings
 from ...write.files import whole_folder
 from ..plan.overrides import OVERRIDES_FILE
@@ -175,14 +176,10 @@ def crop_points(points: dict[str, np.ndarray], plan: WorkPlan, job: Job) -> dict
         "low": plan.terrain_reach_m,
         "noise": plan.around_m,
     }
-    result = {}
-    for kind, xyz in points.items():
-        if job.area.is_empty:
-            result[kind] = np.zeros((0, 3))
-            continue
-        lower, upper = neighbourhood(job, reaches[kind] + MARGIN_M).reshape(2, 2)
-        result[kind] = xyz[((xyz[:, :2] >= lower) & (xyz[:, :2] <= upper)).all(axis=1)]
-    return result
+    return {
+        kind: xyz[in_box(xyz, neighbourhood(job, reaches[kind] + MARGIN_M))]
+        for kind, xyz in points.items()
+    }
 
 
 def write_points(path: Path, points: dict[str, np.ndarray]) -> None:
@@ -198,12 +195,8 @@ def write_points(path: Path, points: dict[str, np.ndarray]) -> None:
     cloud.x, cloud.y, cloud.z = xyz.T
     for name, values in zip(EXACT_COLUMNS, xyz.T, strict=True):
         cloud[name] = values
-    cloud.classification = np.concatenate(
-        [
-            np.full(len(points_of_kind), CLASSES[kind], np.uint8)
-            for kind, points_of_kind in points.items()
-        ]
-    )
+    numbers = [CLASSES[kind] for kind in points]
+    cloud.classification = np.repeat(numbers, list(map(len, points.values())))
     cloud.write(path)
 
 
@@ -269,9 +262,8 @@ def load_bundle(
     except (
         OSError,
         ValueError,
-        KeyError,
+        LookupError,
         TypeError,
-        IndexError,
         AttributeError,
         shapely.errors.ShapelyError,
     ) as error:

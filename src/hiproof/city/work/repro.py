@@ -48,8 +48,8 @@ def search_again(plan: WorkPlan, points: dict[str, np.ndarray]) -> WorkPlan:
         return plan
     kinds = {"roof": read.building_classes[0], "ground": read.ground_classes[0]}
     xyz = np.concatenate([points[kind] for kind in kinds])
-    classes = np.concatenate(
-        [np.full(len(points[kind]), number, np.uint8) for kind, number in kinds.items()]
+    classes = np.repeat(
+        np.array([*kinds.values()], np.uint8), [len(points[kind]) for kind in kinds]
     )
     inside = shapely.intersects_xy(job.area, xyz[:, :2])
     buildings = split_buildings(PointCloud(xyz[inside], classes[inside]), plan.settings)

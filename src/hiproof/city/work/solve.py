@@ -29,6 +29,7 @@ from ...method import reconstruct
 from ...model import Building
 from ...parametric.fallback import list_fallback_columns, use_fallback
 from ...parametric.override import Override, overridden
+from ...read.points.pointcloud import in_box
 from ...read.terrain import Terrain, TerrainChain, read_terrain
 from ...read.terrain.raster import RasterTerrain
 from ...settings import Settings
@@ -212,11 +213,9 @@ class Surroundings:
 
     def select_points(self, job: Job, reach_m: float) -> np.ndarray:
         """Return points (n, 3), each once, that may be roofs in the box around a job."""
-        lower, upper = neighbourhood(job, reach_m).reshape(2, 2)
-        nearby = self.roof[self.grid.candidates((*lower, *upper))]
-        return without_repeats(
-            nearby[((nearby[:, :2] >= lower) & (nearby[:, :2] <= upper)).all(axis=1)]
-        )
+        box = neighbourhood(job, reach_m)
+        nearby = self.roof[self.grid.candidates(box)]
+        return without_repeats(nearby[in_box(nearby, box)])
 
     def has_roofs_alone(self, job: Job, box: np.ndarray) -> bool:
         """Return whether all points in a box around a building are of roofs cut out beforehand.

@@ -32,7 +32,7 @@ from ...read.points.pointcloud import as_input_error, file_kind, iter_points, re
 from ...settings import ReadSettings
 from ...write.files import atomic_file
 from ..plan.overrides import REDO, load_redo
-from ..plan.work_plan import PLAN_FILE, WorkPlan, load_plan
+from ..plan.work_plan import PLAN_FILE, WorkPlan, enclose, grow_boxes, load_plan
 from .ground import lowest_in_cells
 from .noted import load_run_boxes, noted_file, save_run_boxes
 
@@ -56,8 +56,7 @@ class Reach:
     @cached_property
     def bounds(self) -> np.ndarray:
         """(xmin, ymin, xmax, ymax) of all boxes."""
-        boxes = np.vstack([self.terrain_boxes, self.roof_boxes])
-        return np.concatenate([boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)])
+        return enclose(np.vstack([self.terrain_boxes, self.roof_boxes]))
 
     @cached_property
     def mask(self) -> np.ndarray:
@@ -89,9 +88,8 @@ class Reaches:
 
     def __init__(self, plan: WorkPlan, only: Mapping[str, Sequence[int]] | None = None):
         bounds = shapely.bounds([job.area for job in plan.jobs])  # NaN where an area is empty
-        lower, upper = bounds[:, :2], bounds[:, 2:]
-        self.roof_boxes, reach_m = plan.roof_boxes, plan.terrain_reach_m
-        self.terrain_boxes = np.hstack([np.floor(lower - reach_m), np.ceil(upper + reach_m)])
+        self.roof_boxes = plan.roof_boxes
+        self.terrain_boxes = grow_boxes(bounds, plan.terrain_reach_m)
         self.is_partial = only is not None
         self.members = {
             tile: with_area
@@ -282,8 +280,8 @@ def points_by_squares(path: str, reaches: Reaches, units: Units) -> Iterator[Poi
         square = QUERY_M * np.array([column, row, column + 1, row + 1])
         nearby = reaches.bounds[reaches.near(square)]
         if len(nearby):
-            lower, upper = nearby[:, :2].min(axis=0), nearby[:, 2:].max(axis=0)
-            part = (*np.maximum(square[:2], lower), *np.minimum(square[2:], upper))
+            around = enclose(nearby)
+            part = (*np.maximum(square[:2], around[:2]), *np.minimum(square[2:], around[2:]))
             yield from iter_points(path, box=part, units=units)
 
 

@@ -432,6 +432,6 @@ def box_in_file(box: Box, units: Units) -> Box:
     return float(xmin), float(ymin), float(xmax), float(ymax)
 
 
-def in_box(xyz: np.ndarray, box: Box) -> np.ndarray:
+def in_box(xyz: np.ndarray, box: Box | np.ndarray) -> np.ndarray:
     x, y = xyz[:, 0], xyz[:, 1]
     return (x >= box[0]) & (y >= box[1]) & (x <= box[2]) & (y <= box[3])
