@@ -106,8 +106,7 @@ class PlanFrame:
 
     def to_plan(self, xyz_local: np.ndarray) -> np.ndarray:
         """Convert (n, 3) local coordinates to (n, 3) u, v, z."""
-        shifted = xyz_local - self.origin
-        return np.column_stack([shifted[:, :2] @ self.rotation.T, shifted[:, 2]])
+        return np.column_stack([self.uv_plan(xyz_local[:, :2]), xyz_local[:, 2] - self.origin[2]])
 
     def uv_plan(self, xy_local: np.ndarray) -> np.ndarray:
         """Convert (n, 2) local coordinates to (n, 2) plan coordinates."""

@@ -7,11 +7,12 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from importlib.util import find_spec
 from typing import Any, NamedTuple, TypeVar
 
 from .compiled import news
+from .data_files import read_data_file
 from .log import Level, console_level, count_things
 
 T = TypeVar("T")
@@ -30,54 +31,34 @@ class Stage(NamedTuple):
     unit: str = ""
 
 
-STAGES = {
-    "plan": Stage("reading inputs"),
-    "read": Stage("reading points", "point"),
-    "ground": Stage("finding ground and roofs", "square"),
-    "split": Stage("splitting touching houses", "block"),
-    "compile": Stage("compiling, once for each version", "function"),
-    "sort": Stage("sorting points by building", "file"),
-    "solve": Stage("fitting roofs", "building"),
-    "merge": Stage("writing files", "work tile"),
-    "build": Stage("building models", "building"),
-    "enrich": Stage("answering questions", "building"),
-    "convert": Stage("writing models", "building"),
-    "load": Stage("loading models"),
-    "measure": Stage("measuring models"),
-    "classify": Stage("classifying points"),
-    "fetch": Stage("fetching footprints"),
-    "check": Stage("checking solids", "solid"),
-    "label": Stage("labelling points"),
-    "open": Stage("opening the run"),
-    "start": Stage("starting"),
-    "arrange": Stage("making clouds to validate with", "cloud"),
-    "train": Stage("training", "cloud"),
-    "repeat": Stage("running the building again"),
-}
+STAGES = {name: Stage(**row) for name, row in read_data_file("progress").items()}
 
 
 def ignore_progress(*_: object) -> None:
     """Show no news, where nobody wants them."""
 
 
-@contextmanager
-def show_progress(stage: str) -> Iterator[Update]:
+def show_progress(stage: str) -> AbstractContextManager[Update]:
     """Show that `stage` has begun, and yield the function that further news goes to."""
     if console_level() is Level.error:
-        yield ignore_progress
-        return
-    with StageBars(stage) if sys.stderr.isatty() else StageLines(stage) as shown:
-        yield shown.update
+        return nullcontext(ignore_progress)
+    return show(StageBars(stage) if sys.stderr.isatty() else StageLines(stage))
+
+
+def show_in_notebook(stage: str) -> AbstractContextManager[Update]:
+    """Yield the function that gets news; it draws bars in a notebook that can show them."""
+    return show(StageBars(stage)) if is_notebook() else nullcontext(ignore_progress)
 
 
 @contextmanager
-def show_in_notebook(stage: str) -> Iterator[Update]:
-    """Yield the function that gets news; it draws bars in a notebook that can show them."""
-    if not is_notebook():
-        yield ignore_progress
-        return
-    with StageBars(stage) as shown:
-        yield shown.update
+def show(shown: StageBars | StageLines) -> Iterator[Update]:
+    """Yield the function that gets news, those of compiling as well."""
+    with shown:
+        earlier, news.listener = news.listener, functools.partial(shown.update, "compile")
+        try:
+            yield shown.update
+        finally:
+            news.listener = earlier
 
 
 def is_notebook() -> bool:
@@ -111,16 +92,12 @@ class StageLines:
         self.stage, self.finished, self.first, self.start = stage, 0, 0, time.monotonic()
         self.total: int | None = None
 
-    def __enter__(self) -> StageLines:
+    def __enter__(self) -> None:
         self.is_shown, self.is_over = False, threading.Event()
-        self.lines = news.listener
-        news.listener = functools.partial(self.update, "compile")
         self.thread = threading.Thread(target=self.repeat, daemon=True)
         self.thread.start()
-        return self
 
     def __exit__(self, *_: object) -> None:
-        news.listener = self.lines
         self.is_over.set()
         self.thread.join()
 
@@ -191,14 +168,10 @@ class StageBars:
         self.stage = ""
         self.update(stage)
 
-    def __enter__(self) -> StageBars:
+    def __enter__(self) -> None:
         self.bars.start()
-        self.lines = news.listener
-        news.listener = functools.partial(self.update, "compile")
-        return self
 
     def __exit__(self, *_: object) -> None:
-        news.listener = self.lines
         self.bars.stop()
 
     def update(self, stage: str, finished: int = 0, total: int | None = None) -> None:

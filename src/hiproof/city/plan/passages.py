@@ -34,10 +34,11 @@ def add_passages(
     column = request.settings.read.raised_column
     if column:
         refuse_missing_column(footprints, column, "the footprints", "the clearance")
-        clearances = [read_clearance(f.attributes.get(column)) for f in footprints]
         footprints = tuple(
-            f if clearance is None else replace(f, passages=((f.polygon, clearance),))
-            for f, clearance in zip(footprints, clearances, strict=True)
+            replace(f, passages=((f.polygon, clearance),))
+            if (clearance := read_clearance(f.attributes.get(column)))
+            else f
+            for f in footprints
         )
     if request.underpasses is None:
         return footprints
@@ -67,14 +68,15 @@ def read_passages(request: Request, frame: AreaFrame) -> list[tuple[shapely.Poly
         warnings.simplefilter("ignore", InputWarning)  # passages may overlap
         features = read_footprints(path, target_crs=frame.cloud, settings=request.settings)
     refuse_missing_column(features, column, f"the underpasses in {path}", "the clearance")
-    values = [feature.attributes.get(column) for feature in features]
-    layer = [
-        (feature.polygon, clearance)
-        for feature, value in zip(features, values, strict=True)
-        if (clearance := read_clearance(value)) is not None and not feature.polygon.is_empty
-    ]
+    layer, unread = [], []
+    for feature in features:
+        value = feature.attributes.get(column)
+        clearance = read_clearance(value)
+        if clearance is None:
+            unread.append(str(value)[:20])
+        elif not feature.polygon.is_empty:
+            layer.append((feature.polygon, clearance))
     if missing := len(features) - len(layer):
-        unread = [str(value)[:20] for value in values if read_clearance(value) is None]
         subset = f" ({', '.join(unread[:MOST_SHOWN_VALUES])})" if unread else ""
         warnings.warn(
             f"{count_things(missing, 'underpass', 'underpasses')} of {path} left out: column "

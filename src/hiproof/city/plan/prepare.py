@@ -139,8 +139,7 @@ def list_places(boxes: np.ndarray) -> np.ndarray:
     Buildings are looked for there first.
     """
     lower, upper = np.reshape(enclose(boxes), (2, 2))
-    x, y = np.linspace(lower, upper, 8).T
-    return np.column_stack([grid.ravel() for grid in np.meshgrid(x, y)])
+    return np.stack(np.meshgrid(*np.linspace(lower, upper, 8).T), axis=-1).reshape(-1, 2)
 
 
 def limit_buildings_per_tile(settings: Settings) -> int:

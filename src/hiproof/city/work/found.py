@@ -5,7 +5,7 @@ Points that lie on no surface, or on the ground, are left out.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import shapely
@@ -64,13 +64,14 @@ def found_roof(
         parcel = remark_parcel(nearby[inside & is_roof], area) if text == "ground" else ""
         remark = f"no roof seen: its points are {text}{parcel}"
         return FoundRoof(nearby[inside], remark, False, ground, text == "ground")
-    if roof < MOSTLY:
-        remark = (
-            f"mostly not seen: only {100 * roof:.0f} % of what lies inside the outline is roof, "
-            f"the rest {text}"
-        )
-        return FoundRoof(nearby[inside & is_roof], remark, True, ground, text == "ground")
-    return FoundRoof(nearby[inside & is_roof], ground=ground)
+    found = FoundRoof(nearby[inside & is_roof], ground=ground)
+    if roof >= MOSTLY:
+        return found
+    remark = (
+        f"mostly not seen: only {100 * roof:.0f} % of what lies inside the outline is roof, "
+        f"the rest {text}"
+    )
+    return replace(found, remark=remark, is_ground=text == "ground")
 
 
 def find_lone_roof(nearby: np.ndarray, area: shapely.Geometry) -> FoundRoof:

@@ -118,8 +118,8 @@ class ModelAround:
         """Found when first asked for, in units of `step_m`."""
         lower = np.floor(self.box[:2] / self.step_m) - RINGS[-1]
         upper = np.ceil(self.box[2:] / self.step_m) + RINGS[-1]
-        x, y = np.meshgrid(*(np.arange(*sides) + 0.5 for sides in zip(lower, upper, strict=True)))
-        squares = np.column_stack([x.ravel(), y.ravel()])
+        middles = (np.arange(*sides) + 0.5 for sides in zip(lower, upper, strict=True))
+        squares = np.stack(np.meshgrid(*middles), axis=-1).reshape(-1, 2)
         heights = self.model.height_at(squares * self.step_m)
         known = np.column_stack([squares, heights])[np.isfinite(heights)]
         return GroundAround(Cells(known), np.concatenate([lower, upper]))

@@ -175,22 +175,20 @@ class Surroundings:
             return FoundRoof(self.take_near(job.area))
         nearby = self.select_points(job, 0.0)
         if read.roofs == "alone":
-            return self.add_outer_points(job, find_lone_roof(nearby, job.area))
-        height = nearby[:, 2] - TerrainChain(self.find_grounds(job)).height_at(nearby)
-        found = found_roof(nearby, job.area, height, job.footprint is not None)
-        return self.add_outer_points(job, found)
+            found = find_lone_roof(nearby, job.area)
+        else:
+            height = nearby[:, 2] - TerrainChain(self.find_grounds(job)).height_at(nearby)
+            found = found_roof(nearby, job.area, height, job.footprint is not None)
+        if not self.plan.beyond_m or job.footprint is None:
+            return found
+        # points beyond a footprint may show overhangs
+        around = self.select_points(job, self.plan.beyond_m)
+        outside = around[~shapely.intersects_xy(job.area, around[:, :2])]
+        return dataclasses.replace(found, points=np.concatenate([found.points, outside]))
 
     def take_near(self, area: shapely.Polygon) -> np.ndarray:
         """Take the roof points (n, 3) in an area and around it."""
         return self.roof.take(self.grid.find_within(area, self.plan.around_m), axis=0)
-
-    def add_outer_points(self, job: Job, found: FoundRoof) -> FoundRoof:
-        """Return the roof with the points beyond a footprint that may show overhangs."""
-        if not self.plan.beyond_m or job.footprint is None:
-            return found
-        around = self.select_points(job, self.plan.beyond_m)
-        outside = around[~shapely.intersects_xy(job.area, around[:, :2])]
-        return dataclasses.replace(found, points=np.concatenate([found.points, outside]))
 
     def select_neighbours(self, job: Job) -> list[shapely.Polygon]:
         """Return the outlines beside a building, moved with it."""
