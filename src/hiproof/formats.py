@@ -110,9 +110,8 @@ def choose_format(file: str) -> str | None:
     >>> [choose_format(name) for name in ("a.gml", "a.citygml3.gml", "b.json", "c.jsonl", "d.txt")]
     ['citygml2', 'citygml3', 'cityjson', 'cityjsonseq', None]
     """
-    endings = {
-        format.file[format.file.index(".") :]: name for name, format in reversed(CONVERTED.items())
-    }
-    suffixes = {Path(format.file).suffix: name for name, format in reversed(CONVERTED.items())}
-    candidates = [ending for ending in (endings | suffixes) if file.lower().endswith(ending)]
-    return (suffixes | endings)[max(candidates, key=len)] if candidates else None
+    files = [(format.file, name) for name, format in reversed(CONVERTED.items())]
+    names = {Path(file).suffix: name for file, name in files}
+    names |= {file[file.index(".") :]: name for file, name in files}
+    endings = [ending for ending in names if file.lower().endswith(ending)]
+    return names[max(endings, key=len)] if endings else None

@@ -172,17 +172,16 @@ def values_at(text: str) -> Iterator[str]:
 
 def list_forms(secret: str) -> set[str]:
     """Return a secret's forms: as it is, decoded, encoded, and as programs quote it."""
-    plain = {secret, unquote(secret), unquote_plus(secret)}
-    encoded = {encode(text) for text in plain for encode in (quote, quote_plus)} | {
-        quote(text, safe="") for text in plain
-    }
-    quoted = {repr(text)[1:-1] for text in plain} | {json.dumps(text)[1:-1] for text in plain}
-    doubled = {text.replace("'", "''") for text in plain} | {
-        text.replace("\\", "\\\\") for text in plain
-    }
-    as_bytes = {repr(text.encode("utf-8", "replace"))[2:-1] for text in plain}
     return {
-        form for form in plain | encoded | quoted | doubled | as_bytes if re.search(r"\w", form)
+        form
+        for text in {secret, unquote(secret), unquote_plus(secret)}
+        for form in (
+            *(text, quote(text), quote_plus(text), quote(text, safe="")),
+            *(repr(text)[1:-1], json.dumps(text)[1:-1]),
+            *(text.replace("'", "''"), text.replace("\\", "\\\\")),
+            repr(text.encode("utf-8", "replace"))[2:-1],
+        )
+        if re.search(r"\w", form)
     }
 
 

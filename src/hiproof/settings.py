@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import tomllib
+from collections.abc import Iterable
 from dataclasses import dataclass, field, fields
 from numbers import Integral
 from pathlib import Path
@@ -234,13 +235,7 @@ class Settings:
 
     def to_dict(self) -> Changes:
         """Return a plain nested dictionary, ready for JSON."""
-        return {
-            s.name: {
-                f.name: plain(getattr(getattr(self, s.name), f.name))
-                for f in fields(getattr(self, s.name))
-            }
-            for s in fields(self)
-        }
+        return dataclasses.asdict(self, dict_factory=make_plain)
 
     def to_toml(self) -> str:
         """Return TOML of every setting, with its unit, bounds and meaning as comments."""
@@ -344,5 +339,5 @@ def toml_value(value: Any) -> str:
     return repr(value)
 
 
-def plain(value: Any) -> Any:
-    return list(value) if isinstance(value, tuple) else value
+def make_plain(items: Iterable[tuple[str, Any]]) -> dict[str, Any]:
+    return {name: list(value) if isinstance(value, tuple) else value for name, value in items}

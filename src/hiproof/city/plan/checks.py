@@ -91,8 +91,13 @@ def refuse_missing_packages(request: Any) -> None:
 
 def refuse_settings(settings: Settings) -> None:
     """Raise SettingsError or InputError for well-formed values that cannot be used."""
+    from ...read.crs import find_units, parse_crs
+
     refuse_unknown_types(settings.fit)
-    refuse_crs(settings.read)
+    try:
+        find_units(parse_crs(settings.read.crs), "the point clouds", settings.read.unit)
+    except InputError as error:  # the clouds' CRS is unknown, not projected, or of another unit
+        raise SettingsError(str(error)) from error
     refuse_without_network(settings)
     segment = settings.segment
     if segment.network != "never" and (segment.weights or segment.device != "cpu"):
@@ -115,13 +120,3 @@ def refuse_unknown_types(fit: Any) -> None:
             nearby = difflib.get_close_matches(name.lower(), allowed, n=1, cutoff=0.5)
             got.append(" ".join([format_value(name), *(f"(did you mean {k}?)" for k in nearby)]))
         raise SettingsError(f"expected roof types among {', '.join(allowed)}, got {', '.join(got)}")
-
-
-def refuse_crs(read: Any) -> None:
-    """Raise SettingsError unless the clouds' CRS is known, projected and in the unit given."""
-    from ...read.crs import find_units, parse_crs
-
-    try:
-        find_units(parse_crs(read.crs), "the point clouds", read.unit)
-    except InputError as error:
-        raise SettingsError(str(error)) from error

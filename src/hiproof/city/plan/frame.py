@@ -62,7 +62,17 @@ def settle_frame(request: Any, headers: list[PointFileHeader]) -> AreaFrame:
     )
     footprints = footprint_crs(request.footprints, request.layer) if request.footprints else None
     if not names_place(cloud):
-        refuse_degrees_in_inputs(request.footprints, footprints, headers)
+        # clouds that name no CRS may not be in degrees, nor footprints that stand in for theirs
+        if footprints is None:
+            advice = "reproject them to the UTM zone or the national grid of the place"
+            places = plan_bounds(headers)
+            refuse_degrees(places, "the point clouds", f"{advice} (`pdal translate`)")
+        elif footprints.is_geographic:
+            raise InputError(
+                f"expected footprints that tell the CRS of clouds that name none, got "
+                f"{request.footprints} in {describe_crs(footprints)}, which "
+                "is in degrees; name the clouds' CRS with --crs, or reproject the footprints"
+            )
         cloud = place_crs(cloud, footprints, headers[0].path, read.unit)
     frame = AreaFrame(cloud, footprints, find_units(cloud or footprints, unit_name=read.unit))
     if cloud is None and (footprints is not None or read.unit == "auto"):
@@ -136,22 +146,3 @@ def plan_bounds(headers: list[PointFileHeader]) -> np.ndarray:
     """Return the boxes (n, 4) in plan of the point files that hold points, in their own unit."""
     bounds = list_boxes(headers)
     return bounds[np.isfinite(bounds).all(axis=1)]
-
-
-def refuse_degrees_in_inputs(
-    path: str | None, footprints: Any, headers: list[PointFileHeader]
-) -> None:
-    """Refuse clouds or footprints in degrees.
-
-    Clouds that name no CRS may not be in degrees, nor can footprints in degrees stand in for their
-    CRS.
-    """
-    if footprints is not None and footprints.is_geographic:
-        raise InputError(
-            f"expected footprints that tell the CRS of clouds that name none, got {path} in "
-            f"{describe_crs(footprints)}, which "
-            "is in degrees; name the clouds' CRS with --crs, or reproject the footprints"
-        )
-    advice = "reproject them to the UTM zone or the national grid of the place (`pdal translate`)"
-    if footprints is None:
-        refuse_degrees(plan_bounds(headers), "the point clouds", advice)
