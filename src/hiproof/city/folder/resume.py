@@ -169,7 +169,14 @@ def settle(
             remove_tiles(state.parent)
             for tile in plan.tiles.keys() - remainder.keys():
                 write_tile(plan, state, tile, ledger.texts(tile))
-        enter(request, ledger)
+        inputs, salt = describe(request, RESULT), secrets.token_hex(16)
+        ledger.set(  # whose run it is, which makes it one to go on from
+            inputs=json.dumps(masked_values(inputs), default=str),
+            salt=salt,
+            merged="no",
+            mark=compute_mark(inputs, salt),
+            choice=compute_mark(describe(request, SELECTION), salt),
+        )
     if remainder:
         shutil.rmtree(state / "points", ignore_errors=True)
         (state / "points").mkdir()
@@ -181,17 +188,6 @@ def settle(
     elif not lost:
         count = count_things(settled.remainder, "building")
         LOGGER.info("%s with another override than before to be redone", count)
-
-
-def enter(request: Request, ledger: Ledger) -> None:
-    """Enter whose run it is, which makes it one to go on from."""
-    inputs, salt = describe(request, RESULT), secrets.token_hex(16)
-    text = json.dumps(masked_values(inputs), default=str)
-    marks = {
-        "mark": compute_mark(inputs, salt),
-        "choice": compute_mark(describe(request, SELECTION), salt),
-    }
-    ledger.set(inputs=text, salt=salt, merged="no", **marks)
 
 
 def refuse_other_inputs(out: Path, inputs: dict, ledger: Ledger) -> None:

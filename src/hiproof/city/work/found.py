@@ -72,12 +72,3 @@ def found_roof(
         f"the rest {text}"
     )
     return replace(found, remark=remark, is_ground=text == "ground")
-
-
-def find_lone_roof(nearby: np.ndarray, area: shapely.Geometry) -> FoundRoof:
-    """Find the roof within `area` among points of roofs and leaves.
-
-    Points are (n, 3). Leaves go, unless hardly anything would be left.
-    """
-    roof = found_roof(nearby, area, np.full(len(nearby), np.nan))
-    return roof if roof.is_seen else FoundRoof(roof.points)

@@ -34,15 +34,11 @@ def warn_of_steps(points: Path, clouds: Sequence[str]) -> None:
     """
     steps: dict[tuple[int, int], list[float]] = defaultdict(list)
     for tile in sorted({path.parent for path in points.rglob("*.npz")}):
-        files: dict[int, list[Path]] = defaultdict(list)
-        for path in sorted(tile.glob("[0-9]*.npz")):
-            files[int(path.name.split("-")[0])].append(path)
-        pairs = [
-            pair for pair in combinations(sorted(files), 2) if len(steps[pair]) < ENOUGH_PLACES
-        ]
+        numbers = sorted({int(path.name.split("-")[0]) for path in tile.glob("[0-9]*.npz")})
+        pairs = [pair for pair in combinations(numbers, 2) if len(steps[pair]) < ENOUGH_PLACES]
         ground = {}
         for number in {*chain(*pairs)}:
-            loaded = load_files(files[number], ("ground", "low"))
+            loaded = load_files(sorted(tile.glob(f"{number}-*.npz")), ("ground", "low"))
             has_ground = len(loaded["ground"]) > 0
             ground[number] = thin_to_grid(loaded["ground" if has_ground else "low"], 1.0)
         for first, second in pairs:

@@ -47,7 +47,7 @@ from ..plan.outlines import row_outline
 from ..plan.overrides import load_overrides, load_redo
 from ..plan.work_plan import OVERHANG_REACH_M, Job, WorkPlan, load_plan, make_job, neighbourhood
 from .bundles import TerrainRecorder, keep_failure
-from .found import BESIDE_M, FEWEST_BESIDE, FoundRoof, find_lone_roof, found_roof
+from .found import BESIDE_M, FEWEST_BESIDE, FoundRoof, found_roof
 from .ground import (
     FAR_STEP_M,
     BareAround,
@@ -174,8 +174,9 @@ class Surroundings:
         if read.by_class or job.area.is_empty:
             return FoundRoof(self.take_near(job.area))
         nearby = self.select_points(job, 0.0)
-        if read.roofs == "alone":
-            found = find_lone_roof(nearby, job.area)
+        if read.roofs == "alone":  # leaves go, unless hardly anything would be left
+            found = found_roof(nearby, job.area, np.full(len(nearby), np.nan))
+            found = found if found.is_seen else FoundRoof(found.points)
         else:
             height = nearby[:, 2] - TerrainChain(self.find_grounds(job)).height_at(nearby)
             found = found_roof(nearby, job.area, height, job.footprint is not None)
