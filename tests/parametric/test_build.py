@@ -90,6 +90,11 @@ def test_a_runs_own_parameters_give_its_own_files(demo_run, tmp_path):
         assert (tmp_path / name).read_bytes() == (demo_run / name).read_bytes(), name
 
 
+def test_a_ground_above_the_eaves_is_remarked():
+    assert "lies 5.0 m above its eaves" in hiproof.build(house() | {"z_ground": 12.0}).detail
+    assert "above its eaves" not in hiproof.build(house()).detail
+
+
 def test_a_file_that_an_editor_began_with_a_mark_of_its_encoding_is_read(demo_run, tmp_path):
     text = (demo_run / "parameters.jsonl").read_text(encoding="utf-8")
     (tmp_path / "saved.jsonl").write_text(text, encoding="utf-8-sig")

@@ -24,6 +24,7 @@ from ..model import (
 from ..model.overhang import WALLS
 from ..read.models.damage import excerpt
 from ..settings import ComposeSettings, Settings
+from ..stages.judge import remark_ground
 from .record import make_building, on_grid, read_object, read_position, require_mapping
 
 
@@ -116,6 +117,7 @@ def build(parameters: Values, compose: ComposeSettings | None = None) -> Buildin
     if roof is None:
         return building
     result = with_model(building, roof, compose, make_underside(values, building, roof))
+    result = remark_ground(result)
     items = enumerate(values.get("installations", ()))
     installations = tuple(make_installation(item, f"installation {k}") for k, item in items)
     eaves = make_eaves(values, roof)

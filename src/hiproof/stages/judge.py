@@ -83,18 +83,7 @@ def add_cautions(building: Building, points: np.ndarray, inner: Inner) -> Buildi
     """
     from ..evaluate.layers import find_second_surface
 
-    lowest = min(
-        building.solid.vertices[list(ring), 2].min()
-        for face in building.solid.select_faces(ROOF)
-        for ring in face.rings
-    )
-    sunk = building.z_ground - float(lowest)
-    if sunk > SUNK_M:
-        building = add_remark(
-            building,
-            f"the ground ({building.ground_source}) lies {sunk:.1f} "
-            f"{Doubt.GROUND_ABOVE_EAVES.value}: heights of other kinds",
-        )
+    building = remark_ground(building)
     share, apart_m = find_second_surface(points, building.roof, inner)
     if share:
         building = add_remark(
@@ -103,3 +92,20 @@ def add_cautions(building: Building, points: np.ndarray, inner: Inner) -> Buildi
             "apart: two flights, two dates, glass or leaves; use a cloud of one",
         )
     return building
+
+
+def remark_ground(building: Building) -> Building:
+    """Add a remark where the ground lies above the eaves, unless the detail has one."""
+    lowest = min(
+        building.solid.vertices[list(ring), 2].min()
+        for face in building.solid.select_faces(ROOF)
+        for ring in face.rings
+    )
+    sunk = building.z_ground - float(lowest)
+    if sunk <= SUNK_M or Doubt.GROUND_ABOVE_EAVES.value in building.detail:
+        return building
+    return add_remark(
+        building,
+        f"the ground ({building.ground_source}) lies {sunk:.1f} "
+        f"{Doubt.GROUND_ABOVE_EAVES.value}: heights of other kinds",
+    )
