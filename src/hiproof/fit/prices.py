@@ -25,7 +25,7 @@ DETAIL_FACTOR = {"fine": 0.5, "full": 1.0, "main": 4.0}
 # What a roof costs.
 
 DEAD_M = 0.08  # Difference (m) that a person would leave out: it costs nothing.
-VOLUME_UNITS = 0.5  # A visible volume.
+VOLUME_UNITS = 0.25  # A visible volume.
 UNKNOWN_UNITS = 0.45  # A height or a slope, however many planes share it.
 SKEW_UNITS = 0.1  # A plane that is not square to the first of its volume, but nearly.
 LEAN_UNITS = 1.0  # A line with a direction of its own.
