@@ -59,7 +59,8 @@ def archive_and_wheel(tmp_path_factory):
     folder = tmp_path_factory.mktemp("built")
     archive = build("sdist", folder, ROOT)
     with tarfile.open(archive) as tar:
-        tar.extractall(folder, filter="data")
+        tar.extraction_filter = getattr(tarfile, "data_filter", None)  # since Python 3.11.4
+        tar.extractall(folder)
     return archive, build("wheel", folder, folder / archive.name.removesuffix(".tar.gz"))
 
 
