@@ -15,7 +15,7 @@ from shapely import affinity
 import hiproof
 from hiproof.compose import check_solid
 from hiproof.fit.roof import fit_building
-from hiproof.parametric.arrange import merged_parts, split_part
+from hiproof.parametric.arrange import merge_parts, split_part
 from hiproof.primitives.catalogue import CATALOGUE, CURVED
 from points_of_roofs import sample_heights
 
@@ -165,7 +165,7 @@ def test_a_part_cut_in_two_and_merged_again_has_its_cants_over_the_same_walls(si
     building = hiproof.reconstruct(sample_heights(height, outline, 8.0, 0.02), outline)
     record = hiproof.write.parameters.building_record(building)
     halves = split_part(record["parts"][0], side, 0.6)
-    merged = hiproof.build({**record, "parts": [merged_parts(*halves)]})
+    merged = hiproof.build({**record, "parts": [merge_parts(*halves)]})
     xy = shapely.get_coordinates(building.roof.outline.buffer(-0.5))
     assert len(list_cants(merged.parts[0])) == 2
     assert merged.roof.height_at(xy) == pytest.approx(building.roof.height_at(xy), abs=1e-6)

@@ -10,9 +10,9 @@ import numpy as np
 
 from ..errors import InputError
 from ..model import Building, Quality
-from ..parametric.arrange import add_dormer, merged_parts, replace_part, split_part, with_recess
+from ..parametric.arrange import add_dormer, merge_parts, replace_part, split_part, with_recess
 from ..parametric.building import build
-from ..parametric.change import changed_part
+from ..parametric.change import change_part
 from ..parametric.edit import BY_HAND
 from ..parametric.record import list_at, number, place, read_building, require_mapping
 from ..parametric.refit import measure_building, note_fit, refit_parts, select_inside
@@ -71,7 +71,7 @@ class Edit(NamedTuple):
         """Change part `part` by the values of `change`, as `Building.with_part`."""
         index = self.part_at("part")
         change = dict(require_mapping(self.requested.get("change"), "change"))
-        changed = changed_part(self.parts[index], change, self.record["origin"][2])
+        changed = change_part(self.parts[index], change, self.record["origin"][2])
         return replace_part(self.parts, index, changed)
 
     def remove(self) -> list:
@@ -93,7 +93,7 @@ class Edit(NamedTuple):
         first, second = self.part_at("part"), self.part_at("other")
         if first == second:
             raise InputError("expected two parts to merge, got one twice; choose another")
-        merged = merged_parts(self.parts[first], self.parts[second])
+        merged = merge_parts(self.parts[first], self.parts[second])
         return [merged if k == first else p for k, p in enumerate(self.parts) if k != second]
 
     def dormer(self) -> list:

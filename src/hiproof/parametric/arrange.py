@@ -75,7 +75,7 @@ def split_part(part: Values, side: str = "length", share: float = 0.5) -> list[V
     return halves
 
 
-def merged_parts(item: Values, other: Values) -> Values:
+def merge_parts(item: Values, other: Values) -> Values:
     """Merge two parts as the larger one is, over the rectangle and the outlines of both."""
     main, side = sorted(
         map(with_sizes, (item, other)),
@@ -207,30 +207,30 @@ def with_recess(
 
 def replace_part(parts: list[Any], index: int, changed: Values) -> list[Any]:
     """Return the parts with `changed` as part `index`; they leave out its place, if the old."""
-    old = roofed_by(parts[index])
-    rectangle = cover_rectangle(changed) if "outlines" not in changed else roofed_by(changed)
+    old = find_cover(parts[index])
+    rectangle = cover_rectangle(changed) if "outlines" not in changed else find_cover(changed)
     neighbours = [
-        part if k == index else moved_along(part, old, rectangle) for k, part in enumerate(parts)
+        part if k == index else move_along(part, old, rectangle) for k, part in enumerate(parts)
     ]
     return [*neighbours[:index], changed, *neighbours[index + 1 :]]
 
 
-def moved_along(part: Values, old: shapely.Geometry, new: shapely.Geometry) -> Values:
+def move_along(part: Values, old: shapely.Geometry, new: shapely.Geometry) -> Values:
     """Return the part, leaving out `new` if it left out `old`."""
     if "outlines" not in part or old.equals(new):
         return part
     shared = intersect(cover_rectangle(with_sizes(part)), old, GRID_M)
-    if shared.area < LEAST_M2 or roofed_by(part).intersection(shared).area > CLEAR * shared.area:
+    if shared.area < LEAST_M2 or find_cover(part).intersection(shared).area > CLEAR * shared.area:
         return part
-    whole = join(roofed_by(part), shared, GRID_M)
+    whole = join(find_cover(part), shared, GRID_M)
     return leaving_out({**part, "outlines": list_rings(whole)}, new)
 
 
 def leaving_out(part: Values, area: shapely.Geometry) -> Values:
     """Return the part without `area`; raises InputError where nothing is left of it."""
-    if not roofed_by(part).intersection(area).area > 0.0:
+    if not find_cover(part).intersection(area).area > 0.0:
         return part
-    rings = list_rings(subtract(roofed_by(part), area, GRID_M))
+    rings = list_rings(subtract(find_cover(part), area, GRID_M))
     if not rings:
         raise InputError(
             "expected a recess smaller than the part it lies in, got one that covers it; delete "
@@ -239,7 +239,7 @@ def leaving_out(part: Values, area: shapely.Geometry) -> Values:
     return {**part, "outlines": rings}
 
 
-def roofed_by(part: Values) -> shapely.Geometry:
+def find_cover(part: Values) -> shapely.Geometry:
     """Return what a part roofs in plan: its outlines, else its rectangle."""
     if part.get("outlines") is None:
         return cover_rectangle(part)

@@ -27,7 +27,7 @@ USUAL_PITCH = 0.5  # rise by run of a roof made of a flat one
 STEEPEST_SLOPE = math.tan(math.radians(85.0))  # rise over run; a steeper plane is a wall
 
 
-def changed_part(part: Values, change: Values, z_origin: float) -> Values:
+def change_part(part: Values, change: Values, z_origin: float) -> Values:
     """Return a part after a change.
 
     A change may name `type`, `position` (x, y, z about the origin), `rotation` (degrees),

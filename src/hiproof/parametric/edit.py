@@ -14,7 +14,7 @@ from ..status import Status
 from ..write.parameters import building_record
 from .arrange import replace_part
 from .building import build
-from .change import changed_part
+from .change import change_part
 
 BY_HAND = "changed by hand"
 
@@ -31,7 +31,7 @@ def with_part(building: Building, index: int, **change: Any) -> Building:
     if index == len(parts):
         parts = [*parts, new_part(change, z_origin)]
     else:
-        parts = replace_part(parts, index, changed_part(parts[index], change, z_origin))
+        parts = replace_part(parts, index, change_part(parts[index], change, z_origin))
     return rebuild(building, {**record, "parts": parts})
 
 
@@ -58,7 +58,7 @@ def new_part(change: Values, z_origin: float) -> Values:
         )
     sizes = {name: change[name] for name in ("width", "length")}
     flat = {"type": "flat", "parameters": sizes, "position": change["position"], "rotation": 0.0}
-    return changed_part(flat, change, z_origin)
+    return change_part(flat, change, z_origin)
 
 
 def without_part(building: Building, index: int) -> Building:

@@ -75,7 +75,9 @@ def list_places(roof: Tables, site: Site) -> Iterator[Box]:
 
 def add_all(draft: Draft, scene: Scene, box: Box) -> Draft:
     """Add volumes in a window as long as one saves. Returns the roof with them."""
-    return [draft, *add_each(draft, scene, box)][-1]
+    for better in add_each(draft, scene, box):
+        draft = better
+    return draft
 
 
 def add_each(draft: Draft, scene: Scene, box: Box) -> Iterator[Draft]:

@@ -58,7 +58,8 @@ from .tables import (
     SPLIT,  # volume a where its points begin to lie higher or lower beyond its side b
 ) = range(21)
 MOVE_COLUMNS = 5  # Numbers of a move: its kind and four more.
-# What to try of a volume. One whose unknowns are shared is where it was.
+# What to try of a volume. One whose unknowns are shared is where it was. A new one is not left out:
+# the roof without it is known.
 NO_MOVES, SHARES_ONLY, NEW_MOVES, ALL_MOVES = range(4)
 # Planes face square to their sides, along the axis between two sides, or square to either.
 FACE_SIDES, FACE_AXIS, FACE_FIRST, FACE_SECOND = 1, 2, 3, 4

@@ -37,16 +37,16 @@ def ply_chunks(path: FilePath, chunk_points: int) -> Iterator[Chunk]:
         # the count is held against the file's size before room is made for so many
         least_bytes = len("0 0 0") if layout.record is None else layout.record.itemsize
         if layout.vertices * least_bytes > end - start:
-            raise truncated(layout, path, f"{end - start} bytes of them")
+            raise explain_truncation(layout, path, f"{end - start} bytes of them")
         for read in range(0, layout.vertices, chunk_points):
             count = min(chunk_points, layout.vertices - read)
             table = read_vertices(file, layout, count, path, read)
             if len(table) < count:
-                raise truncated(layout, path, read + len(table))
+                raise explain_truncation(layout, path, read + len(table))
             yield as_chunk(table)
 
 
-def truncated(layout: PlyLayout, path: FilePath, got: object) -> InputError:
+def explain_truncation(layout: PlyLayout, path: FilePath, got: object) -> InputError:
     return InputError(
         f"expected {count_things(layout.vertices, 'vertex', 'vertices')} in {path} as its header "
         f"says, got {got}; the file is truncated: copy or download it again"

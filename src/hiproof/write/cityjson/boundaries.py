@@ -89,7 +89,7 @@ def level_surfaces(building: Building, shapes: Shapes, vertices: Vertices) -> li
     edge = multi_surface(
         ground_boundaries((shapes.outline,), shapes.edge_vertices(solid), vertices)
     )
-    return [named_surfaces(footprint, GROUND), named_surfaces(edge, ROOF)]
+    return [name_surfaces(footprint, GROUND), name_surfaces(edge, ROOF)]
 
 
 def ground_boundaries(
@@ -103,7 +103,7 @@ def multi_surface(boundaries: list) -> Values:
     return {"type": "MultiSurface", "lod": LOD_FOOTPRINT, "boundaries": boundaries}
 
 
-def named_surfaces(surface: Values, kind: str) -> Values:
+def name_surfaces(surface: Values, kind: str) -> Values:
     return {
         **surface,
         "semantics": {"surfaces": [{"type": kind}], "values": [0] * len(surface["boundaries"])},
